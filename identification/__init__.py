@@ -1,0 +1,1 @@
+"""Sweep record -> frequency response -> plant model -> additive bound."""

@@ -1,0 +1,158 @@
+"""model.json, the contract between identification and design: the plant, its standard errors, its bound."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from identification.files import InputError, read_text
+from identification.plant import AdditiveBound, Mode, PlantModel
+from identification.thesis import printed
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class IdentifiedModel:
+    """What identification hands to design.
+
+    Parameters
+    ----------
+    plant
+        The nominal model P(s).
+    additive_bound
+        W_a(s), at least as large as the distance between P and every test.
+    standard_errors
+        One standard error for each parameter, in the shape of the ``plant`` object of model.json and in the
+        parameters' own units; None when the parameters were not estimated (the thesis's printed sets).
+    fit
+        How the model came about: free-form facts that JSON can hold.
+    """
+
+    plant: PlantModel
+    additive_bound: AdditiveBound
+    standard_errors: Mapping[str, Any] | None
+    fit: Mapping[str, Any]
+
+    def to_json(self) -> str:
+        """The text of model.json; every number is finite or this raises ValueError."""
+        content = {
+            "schema": SCHEMA,
+            "plant": plant_to_dict(self.plant),
+            "standard_errors": self.standard_errors,
+            "additive_bound": asdict(self.additive_bound),
+            "fit": dict(self.fit),
+        }
+        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+
+def plant_to_dict(plant: PlantModel) -> dict[str, Any]:
+    """The ``plant`` object of model.json and design.json."""
+    return {
+        "gain": plant.gain,
+        "zero_modes": [asdict(mode) for mode in plant.zero_modes],
+        "pole_modes": [asdict(mode) for mode in plant.pole_modes],
+        "delay_s": plant.delay_s,
+    }
+
+
+def plant_from_dict(content: Mapping[str, Any]) -> PlantModel:
+    """Read what :func:`plant_to_dict` writes (also the plants of thesis.toml).
+
+    Raises
+    ------
+    InputError
+        A number is missing, is not a number, or is out of its range.
+    """
+    return PlantModel(
+        gain=number(content, "gain"),
+        zero_modes=_modes(content, "zero_modes"),
+        pole_modes=_modes(content, "pole_modes"),
+        delay_s=number(content, "delay_s"),
+    )
+
+
+def bound_from_dict(content: Mapping[str, Any]) -> AdditiveBound:
+    """Read the ``additive_bound`` object of model.json; raises InputError as :func:`plant_from_dict` does."""
+    return AdditiveBound(*(number(content, key) for key in ("gain", "corner", "omega", "zeta")))
+
+
+def read_model(name: str) -> IdentifiedModel:
+    """Read a model.json, or give the thesis's own sets for the words ``table`` and ``implied``.
+
+    Both words come with the printed bound (2.22). ``table`` is Table 2.1 as printed; ``implied`` is the set
+    that gives back the transfer functions printed after it.
+
+    Raises
+    ------
+    InputError
+        No such file, not JSON, another schema, or a number missing or out of range.
+    """
+    if name in printed()["plants"]:
+        return IdentifiedModel(
+            plant=plant_from_dict(printed()["plants"][name]),
+            additive_bound=bound_from_dict(printed()["additive_bound"]),
+            standard_errors=None,
+            fit={"source": f"thesis, parameter set '{name}'"},
+        )
+    content = read_json(Path(name), SCHEMA)
+    try:
+        return IdentifiedModel(
+            plant=plant_from_dict(member(content, "plant")),
+            additive_bound=bound_from_dict(member(content, "additive_bound")),
+            standard_errors=content.get("standard_errors"),
+            fit=content.get("fit", {}),
+        )
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+
+
+def read_json(path: Path, schema: int) -> dict[str, Any]:
+    """Read a JSON object whose member ``schema`` must have the given value.
+
+    Raises
+    ------
+    InputError
+        No such file, not JSON, not an object, or another schema.
+    """
+    text = read_text(path)
+    try:
+        content = json.loads(text, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{path}, line {error.lineno}: not JSON ({error.msg})") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    found = content.get("schema") if isinstance(content, dict) else None
+    if found != schema:
+        raise InputError(f"{path}: schema is {found!r}; expected {schema}")
+    return content
+
+
+def member(content: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    """Return the JSON object at ``key``; raises InputError when there is none."""
+    value = content.get(key)
+    if not isinstance(value, Mapping):
+        raise InputError(f"'{key}' is {value!r}; expected an object")
+    return value
+
+
+def number(content: Mapping[str, Any], key: str) -> float:
+    """Return the number at ``key``; raises InputError when there is none."""
+    value = content.get(key)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"'{key}' is {value!r}; expected a number")
+    return float(value)
+
+
+def _modes(content: Mapping[str, Any], key: str) -> tuple[Mode, ...]:
+    modes = content.get(key)
+    if not isinstance(modes, list) or not all(isinstance(mode, Mapping) for mode in modes):
+        raise InputError(f"'{key}' is {modes!r}; expected a list of objects with 'omega' and 'zeta'")
+    return tuple(Mode(omega=number(mode, "omega"), zeta=number(mode, "zeta")) for mode in modes)
+
+
+def _refuse_constant(name: str) -> float:
+    raise InputError(f"holds {name}; expected finite numbers only")

@@ -1,0 +1,1 @@
+"""One module a thesis figure: ``draw(results)`` is pure, ``main()`` reads, draws and saves."""
