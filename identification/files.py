@@ -15,6 +15,12 @@ class InputError(ValueError):
     """Something the user gave cannot be used; the message is one sentence saying what, where and what else."""
 
 
+class Refusal(click.ClickException):
+    """How a command line shows an :class:`InputError`."""
+
+    exit_code = 2
+
+
 class CommandGroup(click.Group):
     """A click group whose commands answer an :class:`InputError` with its sentence and exit status 2."""
 
@@ -22,9 +28,7 @@ class CommandGroup(click.Group):
         try:
             return super().invoke(ctx)
         except InputError as error:
-            refusal = click.ClickException(str(error))
-            refusal.exit_code = 2
-            raise refusal from None
+            raise Refusal(str(error)) from None
 
 
 def read_text(path: Path) -> str:

@@ -46,8 +46,8 @@ class Mode:
 
     def __call__(self, s: ArrayLike) -> Complex:
         """Evaluate the factor at complex frequencies ``s`` (any shape, rad/s)."""
-        x = np.asarray(s, dtype=complex) / self.omega
-        return 1 + (2 * self.zeta + x) * x
+        x: Complex = np.asarray(s, dtype=np.complex128) / self.omega
+        return np.asarray(1 + (2 * self.zeta + x) * x)
 
     @property
     def roots(self) -> tuple[complex, complex]:
@@ -91,8 +91,8 @@ class PlantModel:
 
     def __call__(self, s: ArrayLike) -> Complex:
         """Evaluate P at complex frequencies ``s`` (any shape, rad/s), mode by mode."""
-        s = np.asarray(s, dtype=complex)
-        value = self.gain / s * np.exp(-self.delay_s * s)
+        s = np.asarray(s, dtype=np.complex128)
+        value: Complex = np.asarray(self.gain / s * np.exp(-self.delay_s * s))
         for mode in self.zero_modes:
             value = value * mode(s)
         for mode in self.pole_modes:
@@ -128,5 +128,5 @@ class AdditiveBound:
 
     def __call__(self, s: ArrayLike) -> Complex:
         """Evaluate W_a at complex frequencies ``s`` (any shape, rad/s)."""
-        s = np.asarray(s, dtype=complex)
+        s = np.asarray(s, dtype=np.complex128)
         return self.gain * (1 + s / self.corner) / Mode(self.omega, self.zeta)(s)

@@ -1,0 +1,113 @@
+"""The chapter 2 design: internal model, H-infinity stabiliser and anti-windup for the plant without its dead time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+
+import numpy as np
+
+from design.anti_windup import describe, second_order, thesis_choice, washout
+from design.block import Block, bound_block, plant_denominator, plant_numerator
+from design.contract import Design
+from design.internal_model import internal_model, reference_polynomial
+from design.mixed_sensitivity import mixed_sensitivity
+from identification.files import InputError
+from identification.model import IdentifiedModel
+
+TRACKING = 0.01  # W1 asks for |S| below gamma times this at the reference's frequencies
+SETTLED = 0.01  # what is left of a transient after one period of the reference
+
+
+def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -> Design:
+    """Chapter 2: Lambda, F1, F2, G_A, the stabiliser K, theta1~, theta1 and theta2.
+
+    Parameters
+    ----------
+    model
+        Plant (its dead time is ignored, as the thesis does) and W_a.
+    period_s
+        Period of the sinusoidal reference in seconds.
+    epsilon
+        Of the factor s^2 + epsilon of Lambda, in rad^2/s^2.
+
+    Raises
+    ------
+    InputError
+        A number is out of its range, or the plant has more pole modes than zero modes, for which 1 + F and
+        W2 G_A lose the degrees that the construction needs.
+    SynthesisError
+        The synthesis failed its own check.
+
+    Notes
+    -----
+    The thesis prints neither W1 nor W2, so their principle is ours, after Remark 1:
+
+    W2 = W_a/G, the multiplicative bound itself, so that ||W2 T|| < 1 is robust stability. Where deg Lambda
+    exceeds deg B it gets as many zeros, a decade above the plant's fastest root, as make W2 G_A biproper.
+
+    W1 has the reference's poles, damped: moved left by twice the decay rate, which makes the stabiliser's
+    zeros there cancel, and W1(0) = 1/TRACKING. The decay rate leaves SETTLED of a transient after one period,
+    or is half that of the slowest mode of plant and bound where these decay more slowly.
+    """
+    if not (math.isfinite(period_s) and period_s > 0):
+        raise InputError(f"the period is {period_s:g} s; expected a positive number")
+    plant = model.plant.without_delay()
+    if len(plant.zero_modes) != len(plant.pole_modes):
+        raise InputError(
+            f"the plant has {len(plant.zero_modes)} zero modes and {len(plant.pole_modes)} pole modes; "
+            "the delay-free design expects equally many"
+        )
+    omega = 2 * math.pi / period_s
+    units = internal_model(plant, omega, epsilon)
+    A, B, W_a = plant_denominator(plant), plant_numerator(plant), bound_block(model.additive_bound)
+    slowest = min(-root.real for root in A.zeros + B.zeros + W_a.poles if root != 0)
+    decay_rate = min(math.log(1 / SETTLED) / period_s, slowest / 2)
+
+    fastest = max(abs(root) for root in A.zeros + B.zeros + W_a.poles + units.Lambda.zeros)
+    W2 = W_a * A * B.inverse()
+    missing = (W2 * units.G_A).relative_degree
+    W2 = W2 * Block((10 * fastest) ** -missing, (complex(-10 * fastest),) * missing)
+    damped = tuple(root - 2 * decay_rate for root in reference_polynomial(omega, epsilon).zeros)
+    W1 = Block(float(np.prod(np.abs(damped))) / TRACKING, (), damped)
+    synthesis = mixed_sensitivity(units.G_A, W1, W2, decay_rate)
+
+    alpha, beta, gamma = thesis_choice(model.additive_bound)
+    thesis = second_order(alpha, beta, gamma)
+    rate = 2 * decay_rate
+    corrected = washout(model.additive_bound, rate)
+    return Design(
+        kind="delay-free",
+        plant=model.plant,
+        additive_bound=model.additive_bound,
+        reference_omega=omega,
+        blocks={
+            "Lambda": units.Lambda,
+            "F1": units.F1,
+            "F2": units.F2,
+            "G_A": units.G_A,
+            "K": synthesis.K,
+            "theta1_tilde": thesis.theta1_tilde,
+            "theta1": thesis.theta1_tilde * units.one_plus_F,  # Eq. (2.17)
+            "theta2": thesis.theta2(plant),  # Eq. (2.18)
+        },
+        hinf={
+            "gamma_lower": synthesis.gamma_lower,
+            "gamma": synthesis.gamma,
+            "decay_rate": decay_rate,
+            "gamma_line_lower": synthesis.gamma_line_lower,
+            "gamma_line": synthesis.gamma_line,
+            "W1": W1,
+            "W2": W2,
+        },
+        anti_windup={
+            "thesis": {"alpha": alpha, "beta": beta, "gamma": gamma} | asdict(describe(model, thesis)),
+            "corrected": {"rate": rate} | asdict(describe(model, corrected)),
+        },
+        parameters={"period_s": period_s, "epsilon": epsilon},
+    )
+
+
+def controller(design: Design) -> Block:
+    """C = K/(1 + F) = K A/Lambda of a delay-free design, Thesis Eq. (3.10)."""
+    return design.blocks["K"] * plant_denominator(design.plant) * design.blocks["Lambda"].inverse()

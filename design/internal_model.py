@@ -1,0 +1,91 @@
+"""The internal model of chapter 2: Lambda, F1, F2 and the augmented plant G_A (2.2)-(2.6)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.block import (
+    Block,
+    from_polynomial,
+    geometric_scale,
+    plant_block,
+    plant_denominator,
+    plant_numerator,
+    polynomial,
+)
+from identification.files import InputError
+from identification.plant import PlantModel
+
+
+@dataclass(frozen=True)
+class InternalModel:
+    """What the reference asks of the controller.
+
+    Parameters
+    ----------
+    Lambda
+        Polynomial block; the reference's poles are among its roots.
+    F1, F2
+        Internal model units, F1 = G and F1 F2 = F with 1 + F = Lambda/A. F2 is improper, so it is never
+        realised by itself.
+    G_A
+        G/(1 + F) = B/Lambda.
+    one_plus_F
+        Lambda/A; strictly proper for the thesis's plant.
+    """
+
+    Lambda: Block
+    F1: Block
+    F2: Block
+    G_A: Block
+    one_plus_F: Block
+
+
+def reference_polynomial(omega: float, epsilon: float) -> Block:
+    """(s^2 + epsilon)(s^2 + omega^2): the sinusoid, and a factor close to it that holds constants (section 2.4)."""
+    slow = np.sqrt(epsilon)
+    return Block(1.0, (1j * slow, -1j * slow, 1j * omega, -1j * omega))
+
+
+def internal_model(plant: PlantModel, omega: float, epsilon: float) -> InternalModel:
+    """The internal model units for a sinusoidal reference, Thesis Eq. (2.2)-(2.6).
+
+    Parameters
+    ----------
+    plant
+        Its dead time is ignored, as chapter 2 does.
+    omega
+        Angular frequency of the reference in rad/s, positive.
+    epsilon
+        Of the factor s^2 + epsilon that the thesis adds to make G_A proper, in rad^2/s^2; smaller than omega^2.
+
+    Raises
+    ------
+    InputError
+        omega or epsilon is out of its range.
+
+    Notes
+    -----
+    G_A = B/Lambda is proper when deg Lambda >= deg B. The thesis's plant has deg B = 4 = deg Lambda. With more
+    zero modes we fill Lambda up with stable factors s + omega_max, omega_max being the plant's fastest mode:
+    Lemma 1 asks only that (1 + F) A contain the reference's poles.
+    """
+    if not (np.isfinite([omega, epsilon]).all() and omega > 0 and 0 < epsilon < omega**2):
+        raise InputError(
+            f"omega = {omega:g} rad/s and epsilon = {epsilon:g}; expected omega > 0 and 0 < epsilon < omega^2"
+        )
+    A, B = plant_denominator(plant), plant_numerator(plant)
+    fill = max(0, len(B.zeros) - 4)
+    fastest = max((mode.omega for mode in plant.zero_modes + plant.pole_modes), default=omega)
+    Lambda = reference_polynomial(omega, epsilon) * Block(1.0, (complex(-fastest),) * fill)
+    q = geometric_scale(A, Lambda)
+    difference = np.polysub(polynomial(Lambda, q), polynomial(A, q))
+    return InternalModel(
+        Lambda=Lambda,
+        F1=plant_block(plant.without_delay()),
+        F2=from_polynomial(difference, q) * B.inverse(),  # Eq. (2.5)
+        G_A=B * Lambda.inverse(),  # Eq. (2.6)
+        one_plus_F=Lambda * A.inverse(),  # Eq. (2.4)
+    )

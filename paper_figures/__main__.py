@@ -1,0 +1,106 @@
+"""The command line of the figures: ``python -m paper_figures draw NAME... --results DIR --output DIR``."""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Mapping
+from importlib import import_module
+from io import StringIO
+from pathlib import Path
+from typing import Protocol, cast
+
+import click
+import pandas as pd
+from matplotlib.figure import Figure
+
+import paper_figures
+from identification.files import CommandGroup, InputError, read_text
+from paper_figures import style
+
+
+class FigureModule(Protocol):
+    """What a module ``fig_x_yy`` offers."""
+
+    TABLES: tuple[str, ...]
+    """Names of the tables it draws, files ``<name>.csv`` among the results."""
+
+    def draw(self, tables: Mapping[str, pd.DataFrame]) -> Figure:
+        """Return the figure."""
+
+    def caption(self, tables: Mapping[str, pd.DataFrame]) -> str:
+        """Return the caption."""
+
+
+@click.group(cls=CommandGroup)
+def main() -> None:
+    """Draw the figures of the thesis."""
+
+
+@main.command()
+@click.argument("names", metavar="NAME...", nargs=-1, required=True)
+@click.option(
+    "--results",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="Folder of the tables that the experiments wrote.",
+)
+@click.option("--output", type=click.Path(path_type=Path), required=True, help="Existing folder to write to.")
+def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
+    """Draw the figures NAME..., such as fig_2_01, each as PDF, SVG and PNG with its caption as text."""
+    drawn = {}
+    for name in names:
+        module = figure_module(name)
+        tables = {table: read_table(results / f"{table}.csv", name) for table in module.TABLES}
+        with style.styled():
+            drawn[name] = module.draw(tables), module.caption(tables)
+    for name, (figure, caption) in drawn.items():
+        style.save(figure, output, name, caption)
+
+
+def figure_names() -> list[str]:
+    """Return the names of all figures, in the order of the thesis."""
+    return sorted(
+        module.name
+        for module in pkgutil.iter_modules(paper_figures.__path__)
+        if module.name.startswith("fig_")
+    )
+
+
+def figure_module(name: str) -> FigureModule:
+    """Return the module that draws the named figure.
+
+    Raises
+    ------
+    InputError
+        There is no such figure.
+    """
+    if name not in figure_names():
+        raise InputError(f"{name}: no such figure; the figures are {', '.join(figure_names())}")
+    return cast(FigureModule, import_module(f"paper_figures.{name}"))
+
+
+def read_table(path: Path, figure: str) -> pd.DataFrame:
+    """Return a table of results, its ``#`` lines left out.
+
+    Parameters
+    ----------
+    path
+        The CSV file.
+    figure
+        Name of the figure that needs it, for the message.
+
+    Raises
+    ------
+    InputError
+        The file is missing or is no table.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such table, which {figure} needs")
+    try:
+        return pd.read_csv(StringIO(read_text(path)), comment="#")
+    except (pd.errors.ParserError, pd.errors.EmptyDataError):
+        raise InputError(f"{path}: not a table of comma-separated values, which {figure} needs") from None
+
+
+if __name__ == "__main__":
+    main(prog_name="python -m paper_figures")
