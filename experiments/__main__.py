@@ -1,0 +1,180 @@
+"""Command line of this room: ``simulate`` for one run, and one command for each experiment behind the figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import click
+import numpy as np
+import pandas as pd
+
+from design.anti_windup import AntiWindup, second_order
+from design.contract import Design, read_design
+from experiments.additive_error import additive_error_tables
+from experiments.closed_loop import DivergenceError, simulate
+from experiments.delay_free import delay_free_tables
+from experiments.extended import extended_tables
+from experiments.f_gamma import f_gamma_tables
+from experiments.loops import design_loop
+from experiments.metrics import last_saturation
+from experiments.pid import pid_tables
+from experiments.scenarios import Reference, thesis_reference
+from identification.files import CommandGroup, InputError, write_whole
+from identification.frequency_response import read_sweep
+from identification.model import read_model
+
+OUTPUT_FOLDER = click.option(
+    "--output", type=click.Path(path_type=Path, file_okay=False), required=True, help="Existing folder for the tables."
+)
+DESIGN = click.argument("design", type=click.Path(path_type=Path, dir_okay=False))
+
+
+@click.group(cls=CommandGroup)
+def main() -> None:
+    """Simulate the saturated loops of the thesis, their dead time exact."""
+
+
+@main.command("simulate")
+@DESIGN
+@click.option("--limit", type=float, required=True, help="Saturation limits +-LIMIT; inf for none.")
+@click.option("--anti-windup", type=click.Choice(["none", "thesis", "corrected"]), required=True)
+@click.option("--until", type=float, required=True, help="Length of the run in seconds.")
+@click.option("--sample-time", type=float, required=True, help="Distance of the output's rows in seconds.")
+@click.option("--alpha", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
+@click.option("--beta", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
+@click.option("--gamma", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
+@click.option("--amplitude", type=float, help="Of the reference; the thesis's unless given.")
+@click.option("--phase", type=float, help="Of the reference in radians; the thesis's unless given.")
+@click.option("--offset", type=float, help="Of the reference; the thesis's unless given.")
+@click.option("--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV to write.")
+def simulate_command(
+    design: Path,
+    limit: float,
+    anti_windup: str,
+    until: float,
+    sample_time: float,
+    alpha: float | None,
+    beta: float | None,
+    gamma: float | None,
+    amplitude: float | None,
+    phase: float | None,
+    offset: float | None,
+    output: Path,
+) -> None:
+    """Run DESIGN from rest: time_s, reference, output, error, control, saturated_control."""
+    if not limit > 0:
+        raise InputError(f"--limit is {limit:g}; expected a positive number")
+    if not (np.isfinite([until, sample_time]).all() and 0 < sample_time <= until):
+        raise InputError(
+            f"--until is {until:g} and --sample-time {sample_time:g}; expected 0 < sample time <= until, both finite"
+        )
+    content = read_design(design)
+    kind = _compensator(content, anti_windup, {"alpha": alpha, "beta": beta, "gamma": gamma})
+    usual = thesis_reference(content.kind, content.reference_omega)
+    reference = Reference(
+        usual.amplitude if amplitude is None else amplitude,
+        usual.omega,
+        usual.phase_rad if phase is None else phase,
+        usual.offset if offset is None else offset,
+    )
+    time_s = sample_time * np.arange(round(until / sample_time * (1 + 1e-12)) + 1)
+    try:
+        run = simulate(design_loop(content, reference, kind), (-limit, limit), time_s)
+    except DivergenceError as error:
+        raise InputError(f"{design}: {error}") from None
+    table = pd.DataFrame(
+        {
+            "time_s": run.time_s,
+            "reference": run.outputs["reference"],
+            "output": run.outputs["output"],
+            "error": run.outputs["error"],
+            "control": run.control,
+            "saturated_control": run.saturated_control,
+        }
+    )
+    write_tables({output: table})
+    saturated = last_saturation(run)
+    said = "saturated to the end" if np.isnan(saturated) else f"last saturated at {saturated:.6g} s"
+    click.echo(f"{len(table)} rows -> {output}; {len(run.events_s)} crossings of the limits, {said}")
+
+
+def _compensator(design: Design, name: str, numbers: Mapping[str, float | None]) -> AntiWindup | None:
+    given = {key: value for key, value in numbers.items() if value is not None}
+    if given and name != "thesis":
+        raise InputError(f"--{next(iter(given))} belongs to --anti-windup thesis; found --anti-windup {name}")
+    if name == "none":
+        return None
+    if name == "corrected":
+        return design.corrected_anti_windup()
+    chosen = {key: float(design.anti_windup["thesis"][key]) for key in ("alpha", "beta", "gamma")} | given
+    return second_order(chosen["alpha"], chosen["beta"], chosen["gamma"])
+
+
+@main.command("pid")
+@OUTPUT_FOLDER
+def pid(output: Path) -> None:
+    """The PID benchmark of section 2.2: pid.csv, pid_summary.csv."""
+    _write(output, pid_tables())
+
+
+@main.command("f-gamma")
+@DESIGN
+@OUTPUT_FOLDER
+def f_gamma(design: Path, output: Path) -> None:
+    """The parameter study of f(gamma) for the bound of DESIGN: f_gamma.csv, f_gamma_summary.csv."""
+    _write(output, f_gamma_tables(read_design(design).additive_bound))
+
+
+@main.command("delay-free")
+@DESIGN
+@OUTPUT_FOLDER
+def delay_free(design: Path, output: Path) -> None:
+    """The chapter 2 loop: delay_free.csv, delay_free_summary.csv."""
+    _write(output, delay_free_tables(_of_kind(design, "delay-free")))
+
+
+@main.command("extended")
+@DESIGN
+@OUTPUT_FOLDER
+def extended(design: Path, output: Path) -> None:
+    """The chapter 4 loop: extended.csv, extended_summary.csv."""
+    _write(output, extended_tables(_of_kind(design, "extended")))
+
+
+@main.command("additive-error")
+@click.argument("model")
+@click.argument("sweeps", nargs=-1, required=True, type=click.Path(path_type=Path, dir_okay=False))
+@OUTPUT_FOLDER
+def additive_error(model: str, sweeps: tuple[Path, ...], output: Path) -> None:
+    """The additive error of SWEEPS against MODEL: additive_error.csv, additive_error_summary.csv."""
+    _write(output, additive_error_tables(read_model(model), [read_sweep(path) for path in sweeps]))
+
+
+def _of_kind(path: Path, kind: str) -> Design:
+    design = read_design(path)
+    if design.kind != kind:
+        raise InputError(f"{path}: kind is '{design.kind}'; expected '{kind}'")
+    return design
+
+
+def _write(folder: Path, tables: Mapping[str, pd.DataFrame]) -> None:
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder")
+    write_tables({folder / f"{name}.csv": table for name, table in tables.items()})
+
+
+def write_tables(tables: Mapping[Path, pd.DataFrame]) -> None:
+    """Write tables as CSV with 12 significant digits, all of them or none; NaN is written as an empty cell."""
+    write_whole(
+        {
+            path: lambda partial, table=table: table.to_csv(  # type: ignore[misc]
+                partial, index=False, float_format="%.12g", lineterminator="\n"
+            )
+            for path, table in tables.items()
+        }
+    )
+
+
+if __name__ == "__main__":
+    main(prog_name="python -m experiments")

@@ -1,0 +1,46 @@
+"""The additive error of every test under W_a (Fig. 2.9)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from identification.frequency_response import FrequencyResponse
+from identification.model import IdentifiedModel
+
+
+def additive_error_tables(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> dict[str, pd.DataFrame]:
+    """|P - P_test| and |W_a| at every line of every test, Thesis Eq. (2.21).
+
+    Returns
+    -------
+    dict
+        ``additive_error``: test (1, 2, ...), omega in rad/s, error, bound, plant (magnitudes in the plant's
+        unit). ``additive_error_summary``: one row; lines, tests, the largest error/bound and where it is.
+    """
+    frames = []
+    for number, test in enumerate(tests, start=1):
+        s = 1j * test.omega
+        nominal = model.plant(s)
+        frames.append(
+            pd.DataFrame(
+                {
+                    "test": number,
+                    "omega": test.omega,
+                    "error": np.abs(nominal - test.response),
+                    "bound": np.abs(model.additive_bound(s)),
+                    "plant": np.abs(nominal),
+                }
+            )
+        )
+    table = pd.concat(frames, ignore_index=True)
+    worst = table.loc[(table["error"] / table["bound"]).idxmax()]
+    summary = {
+        "tests": len(tests),
+        "lines": len(table),
+        "largest_ratio": worst["error"] / worst["bound"],
+        "largest_ratio_omega": worst["omega"],
+    }
+    return {"additive_error": table, "additive_error_summary": pd.DataFrame([summary])}

@@ -1,0 +1,165 @@
+"""The saturated loop with its exact dead time: one engine for every experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from experiments import taylor
+from identification.files import InputError
+
+
+@dataclass(frozen=True)
+class SaturatedLoop:
+    """x' = A x + B m + D w, u = C x + E w, m = sat(u), w_j(t) = Z_j x(t - delays_j).
+
+    Parameters
+    ----------
+    A, B, C
+        Shapes (n, n), (n,), (n,). The reference is part of the state: it is generated, not sampled.
+    D, E, Z, delays
+        Shapes (n, k), (k,), (k, n), (k,); dead times in seconds, zero allowed. Before t = 0 every delayed
+        signal has the value that it has at t = 0.
+    x0
+        Initial state (n,).
+    outputs
+        Name -> (row over x (n,), row over w (k,)).
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    E: np.ndarray
+    Z: np.ndarray
+    delays: np.ndarray
+    x0: np.ndarray
+    outputs: Mapping[str, tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A simulated run at the sample times.
+
+    Parameters
+    ----------
+    time_s
+        Shape (s,).
+    control, saturated_control
+        u and sat(u), shape (s,).
+    outputs
+        Name -> samples (s,).
+    events_s, modes
+        Every time at which u crosses a limit, located to rounding, and the mode entered: 1 at the upper limit,
+        -1 at the lower one, 0 unsaturated.
+    """
+
+    time_s: np.ndarray
+    control: np.ndarray
+    saturated_control: np.ndarray
+    outputs: Mapping[str, np.ndarray]
+    events_s: np.ndarray
+    modes: np.ndarray
+
+
+class DivergenceError(ArithmeticError):
+    """A signal of the loop passed 1e100."""
+
+
+def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarray) -> Run:
+    """Simulate a loop from t = 0.
+
+    Parameters
+    ----------
+    loop
+        See :class:`SaturatedLoop`.
+    limits
+        (sigma_1, sigma_2) of the saturation, sigma_1 < sigma_2, either may be infinite.
+    time_s
+        Increasing sample times (s,), the first at 0 or later; they do not influence the integration.
+
+    Raises
+    ------
+    InputError
+        The limits are not in order or the times not increasing.
+    DivergenceError
+        The loop diverges.
+
+    Notes
+    -----
+    Dead times are exact and events are located on the polynomials, see :mod:`experiments.taylor`. The step is
+    set by the fastest eigenvalue of the loop, saturated or not, and by the shortest dead time; it is halved
+    until the last term of every series is below 1e-11 of its state.
+    """
+    low, high = limits
+    if not low < high:
+        raise InputError(f"the saturation limits are {low:g} and {high:g}; expected the lower one first")
+    if len(time_s) == 0 or time_s[0] < 0 or np.any(np.diff(time_s) <= 0) or not np.all(np.isfinite(time_s)):
+        raise InputError("the sample times are not increasing finite numbers from zero on")
+    loop = _without_zero_delays(loop)
+    A = csr_array(loop.A)
+    fastest = max(np.abs(np.linalg.eigvals(matrix)).max() for matrix in (loop.A, loop.A + np.outer(loop.B, loop.C)))
+    horizon = float(time_s[-1])
+    step = min([1 / max(fastest, 1e-3 / max(horizon, 1e-3)), *loop.delays])
+    rows = list(loop.outputs.values())
+    outputs_x = np.array([x for x, _ in rows]).reshape(len(rows), len(loop.x0))
+    outputs_w = np.array([w for _, w in rows]).reshape(len(rows), len(loop.delays))
+    most_events = 4096
+    for _ in range(40):
+        values, events, modes, tail, status, end = taylor.integrate(
+            A.indptr,
+            A.indices,
+            A.data,
+            loop.B,
+            loop.D,
+            loop.C,
+            loop.E,
+            loop.Z,
+            loop.delays,
+            loop.x0,
+            float(low),
+            float(high),
+            horizon,
+            step,
+            outputs_x,
+            outputs_w,
+            time_s,
+            most_events,
+        )
+        if status == taylor.CROWDED:
+            most_events *= 8
+        elif tail > 1e-11:
+            step /= 2
+        else:
+            break
+    if status == taylor.DIVERGED:
+        raise DivergenceError(f"the loop diverges: a signal passed 1e100 at t = {end:.6g} s")
+    if status != taylor.COMPLETE or tail > 1e-11:
+        raise ArithmeticError(f"the loop could not be integrated: {len(events)} events up to t = {end:.6g} s")
+    return Run(
+        time_s=time_s,
+        control=values[:, 0],
+        saturated_control=np.clip(values[:, 0], low, high),
+        outputs={name: values[:, 1 + k] for k, name in enumerate(loop.outputs)},
+        events_s=events,
+        modes=modes,
+    )
+
+
+def _without_zero_delays(loop: SaturatedLoop) -> SaturatedLoop:
+    """The same loop with w_j = Z_j x substituted wherever the dead time is zero."""
+    now, later = loop.delays == 0, loop.delays > 0
+    return SaturatedLoop(
+        A=loop.A + loop.D[:, now] @ loop.Z[now],
+        B=loop.B,
+        C=loop.C + loop.E[now] @ loop.Z[now],
+        D=np.ascontiguousarray(loop.D[:, later]),
+        E=np.ascontiguousarray(loop.E[later]),
+        Z=np.ascontiguousarray(loop.Z[later]),
+        delays=loop.delays[later],
+        x0=loop.x0,
+        outputs={name: (x + w[now] @ loop.Z[now], w[later]) for name, (x, w) in loop.outputs.items()},
+    )

@@ -1,0 +1,34 @@
+"""The chapter 2 loop under saturation, without and with anti-windup (Fig. 2.12 to 2.14)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from design.contract import Design
+from experiments.scenarios import thesis_reference
+from experiments.tracking import loops, run_all, tracking_summary, tracking_table
+from identification.thesis import printed
+
+PERIODS = 6  # the thesis does not print its horizon
+SAMPLES_PER_PERIOD = 1000
+
+
+def delay_free_tables(design: Design) -> dict[str, pd.DataFrame]:
+    """Run a delay-free design from rest under the limit that the thesis prints.
+
+    Returns
+    -------
+    dict
+        ``delay_free`` and ``delay_free_summary``, see :mod:`experiments.tracking`.
+    """
+    reference = thesis_reference("delay-free", design.reference_omega)
+    limit = printed()["delay_free"]["limit"]
+    horizon = PERIODS * 2 * np.pi / reference.omega
+    time_s = np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1)
+    runs = run_all(loops(design, reference), limit, time_s)
+    required = reference.amplitude / abs(complex(design.loop_plant(1j * reference.omega)))
+    return {
+        "delay_free": tracking_table(runs),
+        "delay_free_summary": tracking_summary(runs, limit, reference, required),
+    }

@@ -1,0 +1,94 @@
+"""The extended loop of chapter 4 under saturation, without and with anti-windup (Fig. 4.1 to 4.4)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from design.contract import Design
+from experiments.closed_loop import SaturatedLoop, simulate
+from experiments.metrics import last_saturation
+from experiments.pade import with_pade
+from experiments.scenarios import thesis_reference
+from experiments.tracking import loops, run_all, tracking_summary, tracking_table
+from identification.files import InputError
+from identification.thesis import printed
+
+PERIODS = 5  # the thesis does not print its horizon
+SAMPLES_PER_PERIOD = 1000
+PADE_ORDER = 2  # section 4.2
+
+
+def extended_tables(design: Design) -> dict[str, pd.DataFrame]:
+    """Run an extended design from rest, under the limit at which it leaves saturation when the thesis says.
+
+    Returns
+    -------
+    dict
+        ``extended`` and ``extended_summary``, see :mod:`experiments.tracking`. Beside the runs none, thesis and
+        corrected, with the exact dead time, stand none_pade and thesis_pade, with every dead time replaced by
+        the second-order Pade approximation of section 4.2.
+
+    Notes
+    -----
+    Chapter 4 prints no limits. It says of the loop without anti-windup that "until around 4 seconds, the
+    system operates in the nonlinear region"; the limit is the one that makes this so, see
+    :func:`limit_for_last_saturation`.
+    """
+    reference = thesis_reference("extended", design.reference_omega)
+    required = reference.amplitude / abs(complex(design.loop_plant(1j * reference.omega)))
+    horizon = PERIODS * 2 * np.pi / reference.omega
+    exact = loops(design, reference)
+    limit = limit_for_last_saturation(exact["none"], printed()["extended"]["desaturation_s"], required, horizon)
+    every = exact | {f"{name}_pade": with_pade(exact[name], PADE_ORDER) for name in ("none", "thesis")}
+    runs = run_all(every, limit, np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1))
+    return {
+        "extended": tracking_table(runs),
+        "extended_summary": tracking_summary(runs, limit, reference, required),
+    }
+
+
+def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: float, horizon_s: float) -> float:
+    """The limit +-L under which the loop leaves saturation for good at ``target_s``.
+
+    Parameters
+    ----------
+    loop
+        A loop that starts from rest.
+    target_s
+        Wanted time of the last saturation in seconds.
+    required
+        Amplitude of the control in the steady state; below it the loop never leaves saturation.
+    horizon_s
+        How long a run is watched, longer than ``target_s``.
+
+    Raises
+    ------
+    InputError
+        No limit between ``required`` and 64 times it brings the last saturation below ``target_s``.
+
+    Notes
+    -----
+    The time of the last saturation falls with L, but in jumps where a whole excursion disappears; bisection
+    ends at the crossing of ``target_s``, and of the two ends the one nearer in time is returned.
+    """
+
+    def last(limit: float) -> float:
+        time = last_saturation(simulate(loop, (-limit, limit), np.array([0.0, horizon_s])))
+        return time if np.isfinite(time) else np.inf
+
+    low, high = required, 2 * required
+    while last(high) > target_s:
+        low, high = high, 2 * high
+        if high > 64 * required:
+            raise InputError(
+                f"no limit up to {high:.4g} lets the loop leave saturation within {target_s:g} s; "
+                "expected a plant and a design that follow the reference"
+            )
+    while high - low > 1e-6 * high:
+        middle = (low + high) / 2
+        if last(middle) > target_s:
+            low = middle
+        else:
+            high = middle
+    return min((low, high), key=lambda limit: abs(last(limit) - target_s))

@@ -1,0 +1,157 @@
+"""Designs -> saturated loops: Fig. 2.6 with and without its anti-windup, and the PID benchmark of section 2.2."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from design.anti_windup import AntiWindup
+from design.block import Block, plant_block
+from design.contract import Design
+from design.delay_free import controller
+from design.realization import StateSpace, realize
+from experiments.closed_loop import SaturatedLoop
+from experiments.scenarios import PidBenchmark, Reference
+
+
+def design_loop(design: Design, reference: Reference, anti_windup: AntiWindup | None) -> SaturatedLoop:
+    """The loop of Fig. 2.6 around a design, from rest.
+
+    Parameters
+    ----------
+    design
+        Chapter 2: its plant has no dead time. Chapters 3 and 4: exact dead time.
+    reference
+        r(t).
+    anti_windup
+        theta1~ with 1 + theta1~; None takes theta1 and theta2 out of the loop.
+
+    Returns
+    -------
+    SaturatedLoop
+        With the outputs ``reference``, ``output`` (y), ``error`` (r - y), ``y_lin`` (y + y_d) and ``v``, which
+        is the control that the loop would have without saturation.
+
+    Notes
+    -----
+    With e = r - y - y_d and u_tilde = u - sat(u), (1 + F) u + theta1 u_tilde = K e is
+
+        u = v - theta1~ u_tilde,   v = K e/(1 + F),   y_d = theta2 u_tilde = P (1 + theta1~) u_tilde,
+
+    with 1/(1 + F) = A/Lambda in chapter 2, and v = K e + T_so exp(-T_d s) v in chapter 3: 1 + F is never
+    inverted as a block, theta1~ is strictly proper and so is P, and no algebraic loop is left.
+
+          r -->(+)--> K/(1+F) --v-->(+)--> u --> sat --u_m--> P exp(-hs) --> y
+               -^                   -^     |                                 |
+                |                    |     +--> u_tilde --> theta1~          |
+                |                    +---------------------'|                |
+                +---- y_d <-- theta2 <-- u_tilde            '                |
+                +------------------------------------------------------------+
+    """
+    plant = design.loop_plant
+    P = realize(plant_block(plant))
+    if design.kind == "delay-free":
+        forward, feedback = realize(controller(design)), realize(Block(0.0))
+    else:
+        forward, feedback = realize(design.blocks["K"]), realize(design.blocks["T_so"])
+    if anti_windup is None:
+        theta = realize(Block(0.0), Block(0.0))
+    else:
+        theta = realize(anti_windup.theta1_tilde, anti_windup.theta2(plant))
+    generator, r_row, start = reference.generator()
+    return _assemble(P, forward, feedback, theta, generator, r_row, start, plant.delay_s)
+
+
+def _assemble(
+    P: StateSpace,
+    forward: StateSpace,
+    feedback: StateSpace,
+    theta: StateSpace,
+    generator: np.ndarray,
+    r_row: np.ndarray,
+    start: np.ndarray,
+    delay_s: float,
+) -> SaturatedLoop:
+    """States: reference, plant, K/(1+F) or K, T_so, [theta1~; theta2]. Delayed: P's, theta2's and T_so's outputs."""
+    sizes = [len(generator), len(P.b), len(forward.b), len(feedback.b), len(theta.b)]
+    edges = np.concatenate([[0], np.cumsum(sizes)])
+    at_r, at_P, at_K, at_T, at_theta = (slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True))
+    n = int(edges[-1])
+
+    def row(**parts: np.ndarray) -> np.ndarray:
+        places = {"r": at_r, "P": at_P, "K": at_K, "T": at_T, "theta": at_theta}
+        full = np.zeros(n)
+        for name, part in parts.items():
+            full[places[name]] = part
+        return full
+
+    # w = (y, y_d, [T_so v] delayed), each a function of the states only: P, theta2 and T_so are strictly proper
+    Z = np.stack([row(P=P.C[0]), row(theta=theta.C[1]), row(T=feedback.C[0])])
+    e_x, e_w = row(r=r_row), np.array([-1.0, -1.0, 0.0])
+    v_x = row(K=forward.C[0]) + forward.d[0] * e_x
+    v_w = forward.d[0] * e_w + np.array([0.0, 0.0, 1.0])
+    u_x = v_x - row(theta=theta.C[0])
+
+    A = block_diag(generator, P.A, forward.A, feedback.A, theta.A)
+    D = np.zeros((n, 3))
+    A[at_K] += np.outer(forward.b, e_x)
+    D[at_K] += np.outer(forward.b, e_w)
+    A[at_T] += np.outer(feedback.b, v_x)
+    D[at_T] += np.outer(feedback.b, v_w)
+    A[at_theta] += np.outer(theta.b, u_x)  # driven by u_tilde = u - m
+    D[at_theta] += np.outer(theta.b, v_w)
+    B = row(P=P.b) - row(theta=theta.b)
+    x0 = row(r=start)
+    y = np.array([1.0, 0.0, 0.0])
+    return SaturatedLoop(
+        A=A,
+        B=B,
+        C=u_x,
+        D=D,
+        E=v_w,
+        Z=Z,
+        delays=np.full(3, delay_s),
+        x0=x0,
+        outputs={
+            "reference": (e_x, np.zeros(3)),
+            "output": (np.zeros(n), y),
+            "error": (e_x, -y),
+            "y_lin": (np.zeros(n), np.array([1.0, 1.0, 0.0])),
+            "v": (v_x, v_w),
+        },
+    )
+
+
+def pid_loop(benchmark: PidBenchmark, back_calculation: float) -> SaturatedLoop:
+    """The PI loop of section 2.2 with back-calculation: u = P e + x_I, x_I' = I e + K_b (sat(u) - u).
+
+    Parameters
+    ----------
+    benchmark
+        First-order plant with dead time, PI gains, step of the reference.
+    back_calculation
+        K_b in 1/s; 0 is no anti-windup. Simulink's default, which the thesis does not print, is 1.
+    """
+    P, I, K_b = benchmark.proportional, benchmark.integral, back_calculation
+    lag = 1 / benchmark.time_constant_s
+    # states: r, plant, integrator; w = y
+    r, plant, integrator = np.eye(3)
+    u_x, u_w = P * r + integrator, np.array([-P])
+    A = np.diag([0.0, -lag, 0.0])
+    A[2] += I * r - K_b * u_x
+    D = np.array([[0.0], [0.0], [-I + K_b * P]])
+    return SaturatedLoop(
+        A=A,
+        B=benchmark.gain * lag * plant + K_b * integrator,
+        C=u_x,
+        D=D,
+        E=u_w,
+        Z=plant[None, :],
+        delays=np.array([benchmark.delay_s]),
+        x0=benchmark.step * r,
+        outputs={
+            "reference": (r, np.zeros(1)),
+            "output": (np.zeros(3), np.ones(1)),
+            "error": (r, -np.ones(1)),
+        },
+    )

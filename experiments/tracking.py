@@ -1,0 +1,91 @@
+"""What the delay-free and the extended experiment share: one design run without and with each anti-windup."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+from design.anti_windup import AntiWindup
+from design.contract import Design
+from experiments.closed_loop import Run, SaturatedLoop, simulate
+from experiments.loops import design_loop
+from experiments.metrics import last_saturation, over_last, settling_time
+from experiments.scenarios import Reference
+
+SETTLED = 0.01  # band of the settling time, as a share of the reference's amplitude
+
+
+def compensators(design: Design) -> dict[str, AntiWindup | None]:
+    """No anti-windup, the thesis's (2.23), and the corrected one with theta1~(0) = -1."""
+    return {
+        "none": None,
+        "thesis": design.thesis_anti_windup(),
+        "corrected": design.corrected_anti_windup(),
+    }
+
+
+def loops(design: Design, reference: Reference) -> dict[str, SaturatedLoop]:
+    """The loop of the design with each of :func:`compensators`."""
+    return {name: design_loop(design, reference, kind) for name, kind in compensators(design).items()}
+
+
+def run_all(loops: Mapping[str, SaturatedLoop], limit: float, time_s: np.ndarray) -> dict[str, Run]:
+    """Simulate every loop under sat with +-limit."""
+    return {name: simulate(loop, (-limit, limit), time_s) for name, loop in loops.items()}
+
+
+def tracking_table(runs: Mapping[str, Run]) -> pd.DataFrame:
+    """time_s, reference and, for every run NAME, output_NAME, error_NAME, control_NAME, saturated_NAME."""
+    first = next(iter(runs.values()))
+    columns = {"time_s": first.time_s, "reference": first.outputs["reference"]}
+    for name, run in runs.items():
+        columns[f"output_{name}"] = run.outputs["output"]
+        columns[f"error_{name}"] = run.outputs["error"]
+        columns[f"control_{name}"] = run.control
+        columns[f"saturated_{name}"] = run.saturated_control
+    return pd.DataFrame(columns)
+
+
+def tracking_summary(runs: Mapping[str, Run], limit: float, reference: Reference, required: float) -> pd.DataFrame:
+    """One row a run: what the captions say.
+
+    Parameters
+    ----------
+    runs
+        Name -> run.
+    limit
+        Of the actuator, in its unit.
+    reference
+        r(t).
+    required
+        Amplitude of the control that perfect tracking of the sinusoid needs, in the actuator's unit.
+
+    Returns
+    -------
+    DataFrame
+        run, limit, required, last_saturation_s (empty: saturated to the end), settling_s (error within 1 % of the
+        reference's amplitude, measured from the lasting offset of the error; empty: never), offset and
+        ripple (mean and half distance of the extremes of the error over the last period), peak_error_after_1s,
+        relative_error_percent (largest error of the last period over the reference's amplitude).
+    """
+    rows = []
+    period = 2 * np.pi / reference.omega
+    for name, run in runs.items():
+        error = run.outputs["error"]
+        offset, ripple = over_last(run.time_s, error, period)
+        rows.append(
+            {
+                "run": name,
+                "limit": limit,
+                "required": required,
+                "last_saturation_s": last_saturation(run),
+                "settling_s": settling_time(run.time_s, error - offset, SETTLED * abs(reference.amplitude)),
+                "offset": offset,
+                "ripple": ripple,
+                "peak_error_after_1s": np.abs(error[run.time_s >= 1.0]).max(),
+                "relative_error_percent": 100 * (abs(offset) + ripple) / abs(reference.amplitude),
+            }
+        )
+    return pd.DataFrame(rows)
