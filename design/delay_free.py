@@ -44,7 +44,7 @@ def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -
     The thesis prints neither W1 nor W2, so their principle is ours, after Remark 1:
 
     W2 = W_a/G, the multiplicative bound itself, so that ||W2 T|| < 1 is robust stability. Where deg Lambda
-    exceeds deg B it gets as many zeros, a decade above the plant's fastest root, as make W2 G_A biproper.
+    exceeds deg B it gets as many zeros, an octave above the fastest root, as make W2 G_A biproper.
 
     W1 has the reference's poles, damped: moved left by twice the decay rate, which makes the stabiliser's
     zeros there cancel, and W1(0) = 1/TRACKING. The decay rate leaves SETTLED of a transient after one period,
@@ -67,7 +67,7 @@ def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -
     fastest = max(abs(root) for root in A.zeros + B.zeros + W_a.poles + units.Lambda.zeros)
     W2 = W_a * A * B.inverse()
     missing = (W2 * units.G_A).relative_degree
-    W2 = W2 * Block((10 * fastest) ** -missing, (complex(-10 * fastest),) * missing)
+    W2 = W2 * Block((2 * fastest) ** -missing, (complex(-2 * fastest),) * missing)
     damped = tuple(root - 2 * decay_rate for root in reference_polynomial(omega, epsilon).zeros)
     W1 = Block(float(np.prod(np.abs(damped))) / TRACKING, (), damped)
     synthesis = mixed_sensitivity(units.G_A, W1, W2, decay_rate)

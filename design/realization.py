@@ -52,7 +52,8 @@ def realize(*blocks: Block) -> StateSpace:
     so that the states of the chain u -> 1/d_1 -> 1/d_2 -> ... carry all outputs. Unlike a companion form every
     section keeps its own time scale; unlike partial fractions repeated poles need no special case. The
     arithmetic runs in x = s/q with q the geometric mean of the roots. The first block's poles lead the chain,
-    so that it does not see the sections that only others need.
+    so that it does not see the sections that only others need; within a block the fastest leads, so that no
+    fast mode is fed through slow ones, which would leave it tiny.
     """
     for block in blocks:
         if block.relative_degree < 0:
@@ -116,11 +117,11 @@ def _divide(dividend: np.ndarray, divisor: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _common_poles(blocks: Sequence[Block]) -> tuple[complex, ...]:
-    """The least multiset of poles that holds every block's; those of the first block come first."""
+    """The least multiset of poles that holds every block's: those of the first block first, each fastest first."""
     common: list[complex] = []
     for block in blocks:
         spare = list(common)
-        for pole in block.poles:
+        for pole in sorted(block.poles, key=lambda pole: (-abs(pole), pole.real, abs(pole.imag), pole.imag)):
             if pole in spare:
                 spare.remove(pole)
             else:

@@ -12,6 +12,7 @@ import pandas as pd
 from design.anti_windup import AntiWindup, second_order
 from design.contract import Design, read_design
 from experiments.additive_error import additive_error_tables
+from experiments.claims import read_ledger, recompute
 from experiments.closed_loop import DivergenceError, simulate
 from experiments.delay_free import delay_free_tables
 from experiments.extended import extended_tables
@@ -149,6 +150,19 @@ def extended(design: Path, output: Path) -> None:
 def additive_error(model: str, sweeps: tuple[Path, ...], output: Path) -> None:
     """The additive error of SWEEPS against MODEL: additive_error.csv, additive_error_summary.csv."""
     _write(output, additive_error_tables(read_model(model), [read_sweep(path) for path in sweeps]))
+
+
+@main.command("claims")
+@OUTPUT_FOLDER
+def claims(output: Path) -> None:
+    """The numbers that the thesis prints, computed again: claims.csv."""
+    table = recompute(read_ledger())
+    _write(output, {"claims": table})
+    click.echo(f"{len(table)} printed numbers -> {output / 'claims.csv'}")
+    for verdict, count in table["verdict"].value_counts().items():
+        click.echo(f"  {verdict:17s}{count:4d}")
+    for row in table[table["verdict"] != table["status"]].itertuples():
+        click.echo(f"  {row.id}: the ledger says {row.status}, recomputed it {row.verdict}")
 
 
 def _of_kind(path: Path, kind: str) -> Design:

@@ -36,7 +36,7 @@ def additive_error_tables(model: IdentifiedModel, tests: Sequence[FrequencyRespo
             )
         )
     table = pd.concat(frames, ignore_index=True)
-    worst = table.loc[(table["error"] / table["bound"]).idxmax()]
+    worst = table.iloc[int((table["error"] / table["bound"]).to_numpy().argmax())]
     summary = {
         "tests": len(tests),
         "lines": len(table),

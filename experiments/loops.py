@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.linalg import block_diag
 
@@ -75,7 +77,7 @@ def _assemble(
     """States: reference, plant, K/(1+F) or K, T_so, [theta1~; theta2]. Delayed: P's, theta2's and T_so's outputs."""
     sizes = [len(generator), len(P.b), len(forward.b), len(feedback.b), len(theta.b)]
     edges = np.concatenate([[0], np.cumsum(sizes)])
-    at_r, at_P, at_K, at_T, at_theta = (slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True))
+    at_r, at_P, at_K, at_T, at_theta = (slice(a, b) for a, b in pairwise(edges))
     n = int(edges[-1])
 
     def row(**parts: np.ndarray) -> np.ndarray:
@@ -132,14 +134,14 @@ def pid_loop(benchmark: PidBenchmark, back_calculation: float) -> SaturatedLoop:
     back_calculation
         K_b in 1/s; 0 is no anti-windup. Simulink's default, which the thesis does not print, is 1.
     """
-    P, I, K_b = benchmark.proportional, benchmark.integral, back_calculation
+    K_p, K_i, K_b = benchmark.proportional, benchmark.integral, back_calculation
     lag = 1 / benchmark.time_constant_s
     # states: r, plant, integrator; w = y
     r, plant, integrator = np.eye(3)
-    u_x, u_w = P * r + integrator, np.array([-P])
+    u_x, u_w = K_p * r + integrator, np.array([-K_p])
     A = np.diag([0.0, -lag, 0.0])
-    A[2] += I * r - K_b * u_x
-    D = np.array([[0.0], [0.0], [-I + K_b * P]])
+    A[2] += K_i * r - K_b * u_x
+    D = np.array([[0.0], [0.0], [-K_i + K_b * K_p]])
     return SaturatedLoop(
         A=A,
         B=benchmark.gain * lag * plant + K_b * integrator,

@@ -1,4 +1,4 @@
-"""The same loop with its dead times replaced by Pade approximations, as the thesis simulates it; for comparison only."""
+"""A loop with its dead times replaced by Pade approximations, as the thesis simulates it: for comparison only."""
 
 from __future__ import annotations
 

@@ -8,12 +8,19 @@ rounding: x_{i+1} = step/(i+1) (A x_i + B m_i + D w_i), the delayed signals w be
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
 
 ORDER = 20
 GENERATIONS = 12  # a kink's image after this many dead times is smooth to the order of the series
 REACH = 1.5  # a polynomial is read up to this many steps from where it starts
+
+MOST = 1e100  # a loop whose state passes this diverges
 
 COMPLETE, DIVERGED, CROWDED = 0, 1, 2
 
@@ -31,7 +38,8 @@ BINOMIAL = _binomials(ORDER)
 
 
 @njit(cache=True)
-def _horner(c, tau):
+def _horner(c: Array, tau: float) -> float:
+    """sum c_i tau^i."""
     value = 0.0
     for i in range(len(c) - 1, -1, -1):
         value = value * tau + c[i]
@@ -39,7 +47,17 @@ def _horner(c, tau):
 
 
 @njit(cache=True)
-def _sign_changes(b):
+def _dot(a: Array, b: Array) -> float:
+    """sum a_i b_i; for a few terms a loop beats the call of a library."""
+    value = 0.0
+    for i in range(len(a)):
+        value += a[i] * b[i]
+    return value
+
+
+@njit(cache=True)
+def _sign_changes(b: Array) -> int:
+    """Sign changes in a sequence, zeros left out."""
     changes, last = 0, 0
     for value in b:
         sign = 1 if value > 0 else (-1 if value < 0 else 0)
@@ -51,7 +69,7 @@ def _sign_changes(b):
 
 
 @njit(cache=True)
-def first_exit(g, length):
+def first_exit(g: Array, length: float) -> float:
     """The first tau in (0, length] where the polynomial g, positive at the start, becomes negative; -1 if none.
 
     Bernstein coefficients decide: without a sign change there is no root, with one there is exactly one, with
@@ -108,7 +126,7 @@ def first_exit(g, length):
 
 
 @njit(cache=True)
-def _root(g, lo, hi):
+def _root(g: Array, lo: float, hi: float) -> float:
     """The root of g in [lo, hi], g(lo) >= 0 >= g(hi): Newton kept inside a shrinking bracket."""
     tau = 0.5 * (lo + hi)
     for _ in range(200):
@@ -130,7 +148,7 @@ def _root(g, lo, hi):
 
 
 @njit(cache=True)
-def _insert(times, generations, count, t, generation):
+def _insert(times: Array, generations: Array, count: int, t: float, generation: int) -> tuple[Array, Array, int]:
     """Insert a future mesh point into the sorted queue, unless one is there already."""
     for k in range(count):
         if abs(times[k] - t) <= 1e-13 * (1.0 + abs(t)):
@@ -149,26 +167,85 @@ def _insert(times, generations, count, t, generation):
 
 
 @njit(cache=True)
+def _shift(c: Array, delta: float) -> None:
+    """Replace the coefficients of p(tau) by those of p(tau + delta), by repeated synthetic division."""
+    for i in range(len(c) - 1):
+        for m in range(len(c) - 2, i - 1, -1):
+            c[m] += delta * c[m + 1]
+
+
+@njit(cache=True)
+def _series(
+    indptr: Array, indices: Array, data: Array, B: Array, D: Array, C: Array, E: Array,
+    X: Array, W: Array, U: Array, step: float, saturated: bool, level: float,
+) -> None:  # fmt: skip
+    """Fill X[1:] (ORDER + 1, n) and U (ORDER + 1,) from the state X[0] and the delayed signals W (k, ORDER + 1)."""
+    n, k = X.shape[1], len(W)
+    for i in range(ORDER + 1):
+        u = _dot(C, X[i])
+        for j in range(k):
+            u += E[j] * W[j, i]
+        U[i] = u
+        if i == ORDER:
+            return
+        if saturated:
+            u = level if i == 0 else 0.0
+        factor = step / (i + 1)
+        for r in range(n):
+            rate = B[r] * u
+            for q in range(indptr[r], indptr[r + 1]):
+                rate += data[q] * X[i, indices[q]]
+            for j in range(k):
+                rate += D[r, j] * W[j, i]
+            X[i + 1, r] = factor * rate
+
+
+@njit(cache=True)
+def _leave(
+    U: Array, mode: int, on_limit: int, stuck: bool, low: float, high: float, reach: float
+) -> tuple[float, int, int]:
+    """Where on (0, reach] the control leaves its mode, the mode it enters and the limit it crosses; -1 if nowhere.
+
+    Just after an event u lies on a limit exactly; that root at tau = 0 is divided out. ``stuck`` says that the
+    loop keeps returning there without moving (u touches the limit tangentially): then it is let go.
+    """
+    best, entered, crossed = -1.0, mode, 0
+    swing, power = 0.0, 1.0  # |u(tau) - u(0)| <= swing
+    for i in range(1, ORDER + 1):
+        power *= reach
+        swing += abs(U[i]) * power
+    if on_limit == 0 and ((mode >= 0 and U[0] - high > swing) or (mode <= 0 and low - U[0] > swing)):
+        return best, entered, crossed
+    if on_limit == 0 and mode == 0 and high - U[0] > swing and U[0] - low > swing:
+        return best, entered, crossed
+    g = np.zeros(ORDER + 1)
+    for side in (1, -1):
+        limit = high if side == 1 else low
+        if np.isinf(limit) or (mode != 0 and mode != side):
+            continue
+        # positive inside the mode: side (limit - u) when unsaturated, side (u - limit) when saturated
+        sign = -side if mode == 0 else side
+        for i in range(ORDER + 1):
+            g[i] = sign * U[i]
+        g[0] -= sign * limit
+        if on_limit == side:
+            for i in range(ORDER):
+                g[i] = g[i + 1]
+            g[ORDER] = 0.0
+            if stuck and g[0] <= 0:
+                continue
+        found = 0.0 if g[0] < 0 else first_exit(g, reach)
+        if found >= 0 and (best < 0 or found < best):
+            best, entered, crossed = found, (side if mode == 0 else 0), side
+    return best, entered, crossed
+
+
+@njit(cache=True)
 def integrate(
-    indptr,
-    indices,
-    data,
-    B,
-    D,
-    C,
-    E,
-    Z,
-    delays,
-    x0,
-    low,
-    high,
-    horizon,
-    step,
-    outputs_x,
-    outputs_w,
-    samples,
-    most_events,
-):
+    indptr: Array, indices: Array, data: Array, B: Array, D: Array, C: Array, E: Array, Z: Array, delays: Array,
+    x0: Array, low: float, high: float, horizon: float, step: float, outputs_x: Array, outputs_w: Array,
+    samples: Array, most_events: int,
+) -> tuple[Array, Array, Array, float, int, float]:  # fmt: skip
     """Integrate one loop from rest of its delayed signals, w_j(t < 0) = Z_j x0.
 
     Parameters
@@ -196,191 +273,112 @@ def integrate(
     """
     n, k, outputs = len(x0), len(delays), len(outputs_x)
     values = np.zeros((len(samples), 1 + outputs))
-    events, modes = np.empty(most_events), np.empty(most_events, np.int64)
-    event_count = 0
+    events, modes, event_count = np.empty(most_events), np.empty(most_events, np.int64), 0
 
-    pieces = 1024
-    starts = np.empty(pieces)
-    history = np.empty((pieces, k, ORDER + 1))
-    piece_count = 0
+    # the delayed signals' sources, one polynomial a step, and where each dead time reads
+    starts, history, pieces = np.empty(1024), np.empty((1024, k, ORDER + 1)), 0
     cursor = np.zeros(k, np.int64)
-    longest = 0.0
-    for j in range(k):
-        longest = max(longest, delays[j])
+    longest = np.max(delays) if k > 0 else 0.0
+    rest = Z @ x0
 
-    queue, generation = np.empty(64), np.empty(64, np.int64)
-    queued = 0
+    # mesh points to come: images of kinks
+    queue, generation, queued = np.empty(64), np.empty(64, np.int64), 0
     for j in range(k):
         queue, generation, queued = _insert(queue, generation, queued, delays[j], 1)
 
-    x = x0.copy()
-    scale = np.abs(x0)
-    rest = np.zeros(k)
-    for j in range(k):
-        for i in range(n):
-            rest[j] += Z[j, i] * x0[i]
-
-    X = np.zeros((ORDER + 1, n))
-    W = np.zeros((k, ORDER + 1))
-    U = np.zeros(ORDER + 1)
-    g = np.zeros(ORDER + 1)
-    u = 0.0
-    for i in range(n):
-        u += C[i] * x[i]
-    for j in range(k):
-        u += E[j] * rest[j]
+    x, scale = x0.copy(), np.abs(x0)
+    X, W, U = np.zeros((ORDER + 1, n)), np.zeros((k, ORDER + 1)), np.zeros(ORDER + 1)
+    Y = np.zeros((outputs, ORDER + 1))
+    u = _dot(C, x) + _dot(E, rest)
     mode = 1 if u > high else (-1 if u < low else 0)
-    on_limit = 0  # which limit u lies on exactly, just after an event
-    flips = 0
-    t, sample, tail = 0.0, 0, 0.0
-    status = COMPLETE
+    on_limit, standing = 0, 0
+    t, sample, tail, status = 0.0, 0, 0.0, COMPLETE
 
     while t < horizon:
-        length = step
-        if queued > 0 and queue[0] - t < length * (1 + 1e-9):
-            length = queue[0] - t
-        if horizon - t < length:
-            length = horizon - t
-        reach = length / step
+        t_next = min(t + step, horizon)
+        if queued > 0 and queue[0] - t < step * (1 + 1e-9):
+            t_next = min(queue[0], horizon)
+        reach = (t_next - t) / step
 
         for j in range(k):
             start = t - delays[j]
-            middle = start + 0.5 * length
+            middle = start + 0.5 * (t_next - t)  # decides the piece: the ends may lie on a kink
             if middle < 0:
-                W[j, :] = 0.0
+                W[j] = 0.0
                 W[j, 0] = rest[j]
                 continue
-            while cursor[j] + 1 < piece_count and starts[cursor[j] + 1] <= middle:
+            while cursor[j] + 1 < pieces and starts[cursor[j] + 1] <= middle:
                 cursor[j] += 1
-            delta = (start - starts[cursor[j]]) / step
-            coefficients = history[cursor[j], j]
-            for i in range(ORDER + 1):
-                W[j, i] = coefficients[i]
-            if delta != 0.0:  # Taylor shift by repeated synthetic division
-                for i in range(ORDER):
-                    for m in range(ORDER - 1, i - 1, -1):
-                        W[j, m] += delta * W[j, m + 1]
+            W[j] = history[cursor[j], j]
+            _shift(W[j], (start - starts[cursor[j]]) / step)
 
-        level = high if mode == 1 else low
         X[0] = x
-        for i in range(ORDER + 1):
-            value = 0.0
-            for r in range(n):
-                value += C[r] * X[i, r]
-            for j in range(k):
-                value += E[j] * W[j, i]
-            U[i] = value
-            if i == ORDER:
-                break
-            m_i = value if mode == 0 else (level if i == 0 else 0.0)
-            factor = step / (i + 1)
-            for r in range(n):
-                rate = B[r] * m_i
-                for q in range(indptr[r], indptr[r + 1]):
-                    rate += data[q] * X[i, indices[q]]
-                for j in range(k):
-                    rate += D[r, j] * W[j, i]
-                X[i + 1, r] = factor * rate
+        _series(indptr, indices, data, B, D, C, E, X, W, U, step, mode != 0, high if mode == 1 else low)
+        exit_at, entered, crossed = _leave(U, mode, on_limit, standing > 2, low, high, reach)
+        if exit_at >= 0:
+            reach = exit_at
+            t_next = t + exit_at * step
 
-        # where does u leave the mode?
-        exit_at, exit_mode, exit_limit = -1.0, mode, 0
-        for side in (1, -1):
-            limit = high if side == 1 else low
-            if np.isinf(limit) or (mode != 0 and mode != side):
-                continue
-            sign = -side if mode == 0 else side  # inside: side (limit - u) > 0; saturated: side (u - limit) > 0
-            for i in range(ORDER + 1):
-                g[i] = sign * U[i]
-            g[0] -= sign * limit
-            if on_limit == side:
-                for i in range(ORDER):
-                    g[i] = g[i + 1]
-                g[ORDER] = 0.0
-            if g[0] <= 0 and on_limit == side and flips >= 2:
-                continue
-            found = 0.0 if g[0] < 0 else first_exit(g, reach)
-            if found >= 0 and (exit_at < 0 or found < exit_at):
-                exit_at = found
-                exit_mode = side if mode == 0 else 0
-                exit_limit = side
-        end = reach if exit_at < 0 else min(exit_at, reach)
-        t_end = t + end * step
-        if exit_at < 0 and queued > 0 and length == queue[0] - t:
-            t_end = queue[0]
-        if exit_at < 0 and length == horizon - t:
-            t_end = horizon
-
-        # keep the delayed signals' sources; forget what no dead time reaches any more
-        if end > 0 and k > 0:
-            if piece_count == pieces:
-                keep = 0
-                while keep + 1 < piece_count and starts[keep + 1] < t - longest - step:
-                    keep += 1
-                if keep < pieces // 2:
-                    starts_grown, history_grown = np.empty(2 * pieces), np.empty((2 * pieces, k, ORDER + 1))
-                else:
-                    starts_grown, history_grown = np.empty(pieces), np.empty((pieces, k, ORDER + 1))
-                starts_grown[: piece_count - keep] = starts[keep:piece_count]
-                history_grown[: piece_count - keep] = history[keep:piece_count]
-                starts, history, pieces = starts_grown, history_grown, len(starts_grown)
-                piece_count -= keep
-                for j in range(k):
-                    cursor[j] = max(0, cursor[j] - keep)
-            starts[piece_count] = t
+        if reach > 0 and k > 0:
+            if pieces == len(starts):  # forget what no dead time reaches any more, or make room
+                first = 0
+                while first + 1 < pieces and starts[first + 1] < t - longest - step:
+                    first += 1
+                room = len(starts) if first > pieces // 2 else 2 * len(starts)
+                kept, kept_history = np.empty(room), np.empty((room, k, ORDER + 1))
+                kept[: pieces - first] = starts[first:pieces]
+                kept_history[: pieces - first] = history[first:pieces]
+                starts, history, pieces = kept, kept_history, pieces - first
+                cursor -= first
+            starts[pieces] = t
             for j in range(k):
                 for i in range(ORDER + 1):
-                    value = 0.0
-                    for r in range(n):
-                        value += Z[j, r] * X[i, r]
-                    history[piece_count, j, i] = value
-            piece_count += 1
+                    history[pieces, j, i] = _dot(Z[j], X[i])
+            pieces += 1
 
-        while sample < len(samples) and (samples[sample] < t_end or t_end >= horizon):
-            tau = (samples[sample] - t) / step
-            values[sample, 0] = _horner(U, tau)
+        if sample < len(samples) and (samples[sample] < t_next or t_next >= horizon):
             for row in range(outputs):
-                value = 0.0
-                for i in range(ORDER, -1, -1):
-                    term = 0.0
-                    for r in range(n):
-                        term += outputs_x[row, r] * X[i, r]
+                for i in range(ORDER + 1):
+                    Y[row, i] = _dot(outputs_x[row], X[i])
                     for j in range(k):
-                        term += outputs_w[row, j] * W[j, i]
-                    value = value * tau + term
-                values[sample, 1 + row] = value
-            sample += 1
+                        Y[row, i] += outputs_w[row, j] * W[j, i]
+            while sample < len(samples) and (samples[sample] < t_next or t_next >= horizon):
+                tau = (samples[sample] - t) / step
+                values[sample, 0] = _horner(U, tau)
+                for row in range(outputs):
+                    values[sample, 1 + row] = _horner(Y[row], tau)
+                sample += 1
 
-        last = REACH**ORDER
         for r in range(n):
-            value = 0.0
-            for i in range(ORDER, -1, -1):
-                value = value * end + X[i, r]
-            x[r] = value
-            scale[r] = max(scale[r], abs(value))
+            x[r] = X[ORDER, r]
+        for i in range(ORDER - 1, -1, -1):
+            for r in range(n):
+                x[r] = x[r] * reach + X[i, r]
+        for r in range(n):
+            scale[r] = max(scale[r], abs(x[r]))
             if scale[r] > 0:
-                tail = max(tail, abs(X[ORDER, r]) * last / scale[r])
-            if not abs(value) < 1e100:
+                tail = max(tail, abs(X[ORDER, r]) * REACH**ORDER / scale[r])
+            if not abs(x[r]) < MOST:
                 status = DIVERGED
-        flips = flips + 1 if end == 0 else 0
-        t = t_end
+        standing = standing + 1 if reach == 0 else 0
+        t = t_next
         if status == DIVERGED:
             break
 
+        on_limit = crossed
         if exit_at >= 0:
             if event_count == most_events:
                 status = CROWDED
                 break
-            mode, on_limit = exit_mode, exit_limit
+            mode = entered
             events[event_count], modes[event_count] = t, mode
             event_count += 1
             for j in range(k):
                 queue, generation, queued = _insert(queue, generation, queued, t + delays[j], 1)
-        else:
-            on_limit = 0
         while queued > 0 and queue[0] <= t + 1e-13 * (1.0 + t):
             reached, depth = queue[0], generation[0]
-            for q in range(queued - 1):
-                queue[q], generation[q] = queue[q + 1], generation[q + 1]
+            queue[: queued - 1] = queue[1:queued].copy()
+            generation[: queued - 1] = generation[1:queued].copy()
             queued -= 1
             if depth < GENERATIONS:
                 for j in range(k):

@@ -38,9 +38,7 @@ def figure_of_table(monkeypatch):
 
 def run(folders: tuple[Path, Path], *names: str) -> Result:
     results, output = folders
-    return CliRunner().invoke(
-        command_line.main, ["draw", *names, "--results", str(results), "--output", str(output)]
-    )
+    return CliRunner().invoke(command_line.main, ["draw", *names, "--results", str(results), "--output", str(output)])
 
 
 def written(folders: tuple[Path, Path]) -> list[str]:

@@ -1,0 +1,124 @@
+"""The ledger of the numbers that the thesis prints: recompute each, and say whether it agrees."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from experiments.claims_inputs import Inputs, rounded_inputs
+from experiments.printed_number import PrintedNumber, read_number
+from identification.files import InputError, read_text
+from identification.thesis import DATA
+
+LEDGER = DATA / "thesis" / "claims.csv"
+COLUMNS = ("id", "where", "quote", "printed", "unit", "kind", "compute", "status", "reason")
+SLACK = 1e-9  # relative; 175^2 = 30625 lies half-way between the printed 3.062e4 and 3.063e4
+
+Compute = Callable[[Inputs], Mapping[str, float]]
+
+
+def read_ledger(path: Path = LEDGER) -> pd.DataFrame:
+    """Read claims.csv; every cell is text as it stands there.
+
+    Raises
+    ------
+    InputError
+        The file is missing or has other columns.
+    """
+    read_text(path)
+    ledger = pd.read_csv(path, dtype=str, keep_default_na=False)
+    if tuple(ledger.columns) != COLUMNS:
+        raise InputError(f"{path}: the columns are {', '.join(ledger.columns)}; expected {', '.join(COLUMNS)}")
+    return ledger
+
+
+def recompute(ledger: pd.DataFrame) -> pd.DataFrame:
+    """Compute every claim of a ledger again.
+
+    Parameters
+    ----------
+    ledger
+        As :func:`read_ledger` returns it. ``compute`` names a function MODULE:FUNCTION that takes the rounded
+        inputs and returns id -> value; it is empty for an input that nothing else in print contradicts.
+
+    Returns
+    -------
+    DataFrame
+        The ledger with ``computed``, ``half_unit`` (of the last printed digit), ``tolerance`` and ``verdict``:
+        ``input`` without ``compute``; ``not_reproducible`` when the function returns NaN, because the thesis
+        does not print what the number depends on; ``agrees`` when computed - printed is within the tolerance;
+        ``differs`` otherwise.
+
+    Notes
+    -----
+    tolerance = half_unit + SLACK |printed|, and, only where computed - printed exceeds that, the propagated rounding
+    of the inputs. This is linear: each rounded input that the function reads is moved by plus and minus half a
+    unit of its own last digit, and the larger changes are summed.
+
+    Raises
+    ------
+    InputError
+        A function does not exist or does not give a row's id.
+    """
+    inputs = rounded_inputs(ledger)
+    rows = ledger.assign(computed=np.nan, half_unit=0.0, tolerance=np.nan, verdict="input")
+    for compute, claims in ledger.groupby("compute", sort=False):
+        numbers = {name: read_number(text) for name, text in claims[["id", "printed"]].itertuples(index=False)}
+        rows.loc[claims.index, "half_unit"] = [number.half_unit for number in numbers.values()]
+        if compute:
+            computed, tolerance = _compare(str(compute), numbers, inputs)
+            rows.loc[claims.index, "computed"] = computed
+            rows.loc[claims.index, "tolerance"] = tolerance
+            error = np.abs(computed - np.array([number.value for number in numbers.values()]))
+            verdict = np.where(error <= tolerance, "agrees", "differs")
+            rows.loc[claims.index, "verdict"] = np.where(np.isnan(computed), "not_reproducible", verdict)
+    return rows
+
+
+def _compare(
+    name: str, numbers: Mapping[str, PrintedNumber], inputs: Mapping[str, PrintedNumber]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Computed values and tolerances, in the order of the printed numbers."""
+    compute = _function(name)
+    recorder = _Recorder({key: number.value for key, number in inputs.items()})
+    values = compute(recorder)
+    for row in numbers:
+        if row not in values:
+            raise InputError(f"{name} gives {', '.join(values)}; expected '{row}' among them")
+    printed = np.array([number.value for number in numbers.values()])
+    computed = np.array([values[row] for row in numbers])
+    tolerance = np.array([number.half_unit for number in numbers.values()]) + SLACK * np.abs(printed)
+    outside = np.abs(computed - printed) > tolerance
+    if outside.any():
+        spread = np.zeros(len(numbers))
+        for key in sorted(recorder.read):
+            number = inputs[key]
+            moved = [compute(dict(recorder) | {key: number.value + step * number.half_unit}) for step in (1, -1)]
+            spread += np.max([[abs(other[row] - values[row]) for row in numbers] for other in moved], axis=0)
+        tolerance[outside] += spread[outside]
+    return computed, tolerance
+
+
+class _Recorder(dict[str, float]):
+    """A dictionary that remembers which of its keys were asked for."""
+
+    def __init__(self, content: Mapping[str, float]) -> None:
+        super().__init__(content)
+        self.read: set[str] = set()
+
+    def __getitem__(self, key: str) -> float:
+        self.read.add(key)
+        return super().__getitem__(key)
+
+
+def _function(name: str) -> Compute:
+    module, _, function = name.partition(":")
+    try:
+        found: Compute = getattr(importlib.import_module(module), function)
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"the ledger names '{name}', which cannot be imported ({error})") from None
+    return found

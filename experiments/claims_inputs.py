@@ -1,0 +1,69 @@
+"""What the claims are computed from: numbers with the rounding of their print, and the models made of them."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+
+from experiments.printed_number import PrintedNumber, read_number
+from identification.model import plant_from_dict
+from identification.plant import PlantModel
+from identification.thesis import DATA
+
+Inputs = Mapping[str, float]
+
+
+def rounded_inputs(ledger: pd.DataFrame) -> dict[str, PrintedNumber]:
+    """The numbers that are known only to their last digit.
+
+    Parameters
+    ----------
+    ledger
+        Strings, with at least the columns ``id`` and ``printed``.
+
+    Returns
+    -------
+    dict
+        ``printed.ID`` for every row of the ledger; ``implied.gain``, ``implied.pole_modes.0.omega`` and so on for
+        the plant, with the digits that thesis.toml writes.
+
+    Notes
+    -----
+    The plant was identified, so its numbers are rounded. What the thesis chose is exact: W_a, whose zero alpha is
+    said to cancel, epsilon, alpha, beta, gamma, a, e, f and the references. The ``.0`` that TOML asks for at the
+    end of a whole number is no printed digit.
+    """
+    text = (DATA / "thesis" / "thesis.toml").read_text(encoding="utf-8")
+    content = tomllib.loads(text, parse_float=lambda digits: digits.removesuffix(".0"))
+    rows = ledger[["id", "printed"]].itertuples(index=False)
+    implied = _leaves("implied", content["plants"]["implied"])
+    return {f"printed.{name}": read_number(text) for name, text in rows} | {
+        key: read_number(digits) for key, digits in implied
+    }
+
+
+def plant_of(inputs: Inputs) -> PlantModel:
+    """The plant of the set ``implied``."""
+    return plant_from_dict(
+        {
+            "gain": inputs["implied.gain"],
+            "delay_s": inputs["implied.delay_s"],
+            "zero_modes": [_mode(inputs, f"implied.zero_modes.{k}") for k in range(2)],
+            "pole_modes": [_mode(inputs, f"implied.pole_modes.{k}") for k in range(2)],
+        }
+    )
+
+
+def _mode(inputs: Inputs, name: str) -> dict[str, float]:
+    return {key: inputs[f"{name}.{key}"] for key in ("omega", "zeta")}
+
+
+def _leaves(name: str, content: Any) -> list[tuple[str, str]]:
+    if isinstance(content, Mapping):
+        return [leaf for key, part in content.items() for leaf in _leaves(f"{name}.{key}", part)]
+    if isinstance(content, list):
+        return [leaf for k, part in enumerate(content) for leaf in _leaves(f"{name}.{k}", part)]
+    return [(name, content)]

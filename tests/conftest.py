@@ -1,0 +1,34 @@
+"""Models and designs that several tests share; each is made once a session."""
+
+from __future__ import annotations
+
+import pytest
+
+from design.contract import Design
+from design.delay_free import design_delay_free
+from design.extended import design_extended
+from identification.model import IdentifiedModel, read_model
+
+
+@pytest.fixture(scope="session")
+def implied() -> IdentifiedModel:
+    """The set behind the printed transfer functions."""
+    return read_model("implied")
+
+
+@pytest.fixture(scope="session")
+def table() -> IdentifiedModel:
+    """Table 2.1 as printed."""
+    return read_model("table")
+
+
+@pytest.fixture(scope="session")
+def extended_design(implied: IdentifiedModel) -> Design:
+    """Chapter 4 with the printed free parameters."""
+    return design_extended(implied, reference_omega=1.5, a=4.0, e=2.0, f=1.0)
+
+
+@pytest.fixture(scope="session")
+def delay_free_design(implied: IdentifiedModel) -> Design:
+    """Chapter 2 with the printed period and epsilon."""
+    return design_delay_free(implied, period_s=4.0, epsilon=1e-4)

@@ -1,0 +1,166 @@
+"""The engine against closed forms, an independent integrator, and its own refinement."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oracle import reference_run
+
+from design.contract import Design
+from experiments import taylor
+from experiments.closed_loop import DivergenceError, SaturatedLoop, simulate
+from experiments.loops import design_loop, pid_loop
+from experiments.scenarios import PidBenchmark, Reference, thesis_reference
+from identification.files import InputError
+
+FREE = (-np.inf, np.inf)
+
+
+def scalar_loop(a: float, feedback: float, delay_s: float, x0: float) -> SaturatedLoop:
+    """x' = a x + m, u = -feedback x(t - delay), y = x; x(t < 0) = x0."""
+    return SaturatedLoop(
+        A=np.array([[a]]),
+        B=np.ones(1),
+        C=np.zeros(1),
+        D=np.zeros((1, 1)),
+        E=np.array([-feedback]),
+        Z=np.ones((1, 1)),
+        delays=np.array([delay_s]),
+        x0=np.array([x0]),
+        outputs={"x": (np.ones(1), np.zeros(1)), "delayed": (np.zeros(1), np.ones(1))},
+    )
+
+
+def method_of_steps(gain: float, delay: float, t: np.ndarray) -> np.ndarray:
+    """x' = -gain x(t - delay), x = 1 for t <= 0: sum_k (-gain)^k (t - (k-1) delay)^k / k! while t > (k-1) delay."""
+    value = np.ones_like(t)
+    factorial = 1.0
+    for k in range(1, 60):
+        factorial *= k
+        value += np.where(t > (k - 1) * delay, (-gain) ** k * np.clip(t - (k - 1) * delay, 0, None) ** k / factorial, 0)
+    return value
+
+
+@pytest.mark.parametrize(("gain", "delay"), [(1.0, 0.5), (1.5, 0.9), (3.0, 0.3)])
+def test_delayed_integrator_is_the_closed_form(gain: float, delay: float) -> None:
+    t = np.linspace(0, 8 * delay, 301)
+    run = simulate(scalar_loop(0.0, gain, delay, 1.0), FREE, t)
+    np.testing.assert_allclose(run.outputs["x"], method_of_steps(gain, delay, t), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(run.outputs["delayed"], method_of_steps(gain, delay, t - delay), rtol=0, atol=1e-13)
+
+
+def test_saturated_integrator_switches_where_the_closed_form_says() -> None:
+    # u = -x(t - h) from x = 3 under |u| <= 1: x falls at the rate 1 until x(t - h) = 1, that is until t = 2 + h
+    h = 0.25
+    t = np.linspace(0, 2 + h, 91)
+    run = simulate(scalar_loop(0.0, 1.0, h, 3.0), (-1.0, 1.0), np.append(t, 6.0))
+    np.testing.assert_allclose(run.outputs["x"][:-1], 3 - t, rtol=0, atol=1e-13)
+    assert run.events_s[0] == pytest.approx(2 + h, abs=1e-13)
+    assert list(run.modes[:1]) == [0]
+
+
+def test_undelayed_loop_is_the_exponential() -> None:
+    t = np.linspace(0, 3, 50)
+    run = simulate(scalar_loop(0.5, 2.0, 0.0, 1.0), FREE, t)
+    np.testing.assert_allclose(run.outputs["x"], np.exp(-1.5 * t), rtol=1e-13)
+
+
+def test_a_grazing_touch_is_no_event_and_a_hair_more_is_two() -> None:
+    # an oscillator drives u = sin t open loop; the limit is its peak
+    loop = SaturatedLoop(
+        A=np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]),
+        B=np.array([0.0, 0.0, 1.0]),
+        C=np.array([1.0, 0.0, 0.0]),
+        D=np.zeros((3, 0)),
+        E=np.zeros(0),
+        Z=np.zeros((0, 3)),
+        delays=np.zeros(0),
+        x0=np.array([0.0, 1.0, 0.0]),
+        outputs={"integral": (np.array([0.0, 0.0, 1.0]), np.zeros(0))},
+    )
+    t = np.linspace(0, 4.0, 11)
+    assert len(simulate(loop, (-2.0, 1.0 + 1e-9), t).events_s) == 0
+    run = simulate(loop, (-2.0, 1.0 - 1e-9), t)
+    half_width = np.arccos(1 - 1e-9)
+    np.testing.assert_allclose(run.events_s, np.pi / 2 + np.array([-1, 1]) * half_width, atol=1e-7)
+    # m = min(sin, 1/2): its integral in closed form
+    run = simulate(loop, (-2.0, 0.5), t)
+    np.testing.assert_allclose(run.events_s, [np.pi / 6, 5 * np.pi / 6], atol=1e-14)
+    assert run.outputs["integral"][-1] == pytest.approx(1 - 2 * np.cos(np.pi / 6) + np.pi / 3 - np.cos(4.0), abs=1e-13)
+
+
+def test_first_exit_finds_the_first_of_close_roots() -> None:
+    # (tau - 0.3)(tau - 0.3000001)(tau + 2), positive at 0
+    g = np.zeros(taylor.ORDER + 1)
+    g[:4] = np.array([0.3 * 0.3000001 * 2, 0.3 * 0.3000001 - 2 * 0.6000001, 2 - 0.6000001, 1.0])
+    assert taylor.first_exit(g, 1.0) == pytest.approx(0.3, abs=1e-8)
+    assert taylor.first_exit(g, 0.29) == -1.0
+
+
+@pytest.mark.parametrize("kind", ["none", "thesis", "corrected"])
+def test_extended_loop_agrees_with_the_independent_integrator(extended_design: Design, kind: str) -> None:
+    anti_windup = {
+        "none": None,
+        "thesis": extended_design.thesis_anti_windup(),
+        "corrected": extended_design.corrected_anti_windup(),
+    }[kind]
+    loop = design_loop(extended_design, thesis_reference("extended", 1.5), anti_windup)
+    # y is delayed: watch the plant's state behind it as well
+    loop.outputs["p"] = (loop.Z[0], np.zeros(3))  # type: ignore[index]
+    t = np.linspace(0, 0.7, 71)
+    run = simulate(loop, (-12.0, 12.0), t)
+    control, outputs = reference_run(loop, (-12.0, 12.0), t)
+    assert len(run.events_s) > 3
+    scale = np.abs(outputs["p"]).max()
+    np.testing.assert_allclose(run.outputs["p"], outputs["p"], rtol=0, atol=1e-8 * scale)
+    np.testing.assert_allclose(run.control, control, rtol=0, atol=1e-7 * np.abs(control).max())
+
+
+@pytest.mark.parametrize("limit", [8.0, 12.0, 20.0, 40.0])
+def test_step_and_order_do_not_matter(extended_design: Design, limit: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = design_loop(extended_design, thesis_reference("extended", 1.5), extended_design.thesis_anti_windup())
+    t = np.linspace(0, 6, 601)
+    coarse = simulate(loop, (-limit, limit), t).outputs["output"]
+    original = taylor.integrate
+
+    def finer(*arguments: object) -> object:
+        changed = list(arguments)
+        changed[13] = arguments[13] / 3.7  # type: ignore[operator]
+        return original(*changed)
+
+    monkeypatch.setattr(taylor, "integrate", finer)
+    fine = simulate(loop, (-limit, limit), t).outputs["output"]
+    np.testing.assert_allclose(coarse, fine, rtol=0, atol=1e-9 * np.abs(fine).max())
+
+
+def test_linear_steady_state_is_the_frequency_response(extended_design: Design) -> None:
+    # another frequency than the design's, where the error does not vanish: e = S r in the steady state
+    omega = 4.0
+    loop = design_loop(extended_design, Reference(3.0, omega, 0.3, 0.0), None)
+    t = np.linspace(0, 30, 3001)
+    error = simulate(loop, FREE, t).outputs["error"]
+    s = 1j * omega
+    S = 1 - complex(extended_design.blocks["T_so"](s)) * np.exp(-s * extended_design.plant.delay_s)
+    steady = np.imag(3.0 * S * np.exp(1j * (omega * t + 0.3)))
+    np.testing.assert_allclose(error[t > 25], steady[t > 25], rtol=0, atol=1e-8)
+
+
+def test_pid_loop_settles_on_its_step() -> None:
+    benchmark = PidBenchmark(1.5, 40.0, 2.0, 4.5, 0.5, 10.0, 10.0)
+    run = simulate(pid_loop(benchmark, 1.0), (-10.0, 10.0), np.linspace(0, 400, 801))
+    assert run.outputs["output"][-1] == pytest.approx(10.0, abs=1e-6)
+    assert run.control[-1] == pytest.approx(10.0 / 1.5, abs=1e-6)  # static gain
+
+
+def test_divergence_is_said() -> None:
+    with pytest.raises(DivergenceError, match="diverges"):
+        simulate(scalar_loop(40.0, 0.0, 0.1, 1.0), FREE, np.array([0.0, 10.0]))
+
+
+@pytest.mark.parametrize(
+    ("limits", "times", "message"),
+    [((1.0, -1.0), [0.0, 1.0], "limits"), (FREE, [1.0, 0.0], "increasing"), (FREE, [0.0, np.nan], "increasing")],
+)
+def test_bad_arguments_are_refused(limits: tuple[float, float], times: list[float], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        simulate(scalar_loop(0.0, 1.0, 0.1, 1.0), limits, np.array(times))

@@ -1,0 +1,149 @@
+"""python -m identification: what it writes, and that bad input gets one sentence and nothing written."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from identification.__main__ import main
+from identification.model import read_model
+from identification.plant import Mode, PlantModel
+
+PLANT = PlantModel(-2.0, (Mode(50.0, 0.03),), (Mode(80.0, 0.02),), 5e-3)
+
+
+def _fit(*arguments: object) -> Result:
+    return CliRunner().invoke(main, ["fit", *map(str, arguments)])
+
+
+def _sweep(path: Path, seed: int, lines: int = 200, header: str = "") -> Path:
+    rng = np.random.default_rng(seed)
+    frequency_hz = np.linspace(2.0, 40.0, lines)
+    response = PLANT(2j * np.pi * frequency_hz) * (1 + 0.02 * rng.standard_normal((2, lines)).T @ [1, 1j])
+    rows = [f"{f:.6f},{h.real:.9g},{h.imag:.9g}" for f, h in zip(frequency_hz, response, strict=True)]
+    path.write_text(header + "frequency_hz,real,imag\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def sweeps(tmp_path: Path) -> list[Path]:
+    return [_sweep(tmp_path / f"test_{i}.csv", i) for i in range(2)]
+
+
+def test_writes_a_model_that_design_can_read(tmp_path: Path, sweeps: list[Path]) -> None:
+    output = tmp_path / "model.json"
+    result = _fit(*sweeps, "--output", output)
+    assert result.exit_code == 0, result.output
+    model = read_model(str(output))
+    assert model.plant.gain == pytest.approx(-2.0, rel=0.02)
+    assert model.plant.pole_modes[0].omega == pytest.approx(80.0, rel=0.01)
+    assert model.standard_errors is not None
+    assert model.standard_errors["pole_modes"][0].keys() == {"omega", "zeta"}
+    assert 0 < model.standard_errors["delay_s"] < 1e-4
+    assert model.fit["modes"] == 1
+    assert model.fit["synthetic"] is False
+    assert [test["name"] for test in model.fit["tests"]] == ["test_0.csv", "test_1.csv"]
+    assert model.fit["tests"][0]["sha256"] == hashlib.sha256(sweeps[0].read_bytes()).hexdigest()
+    assert model.fit["bound"]["mean_excess"] >= 1
+    assert str(tmp_path) not in output.read_text(encoding="utf-8")
+
+
+def test_prints_estimates_errors_and_scatter(tmp_path: Path, sweeps: list[Path]) -> None:
+    lines = _fit(*sweeps, "--output", tmp_path / "model.json").output.splitlines()
+    assert lines[0].split() == ["parameter", "estimate", "std.", "error", "scatter"]
+    assert lines[1].split()[0] == "gain"
+    assert len(lines[1].split()) == 4
+    single = _fit(sweeps[0], "--output", tmp_path / "model.json").output.splitlines()
+    assert "scatter" not in single[0]
+    assert len(single[1].split()) == 3
+
+
+def test_one_synthetic_file_makes_the_model_synthetic(tmp_path: Path, sweeps: list[Path]) -> None:
+    marked = _sweep(tmp_path / "marked.csv", 3, header="# SYNTHETIC\n")
+    output = tmp_path / "model.json"
+    assert _fit(sweeps[0], marked, "--output", output).exit_code == 0
+    assert json.loads(output.read_text(encoding="utf-8"))["fit"]["synthetic"] is True
+
+
+def test_raw_and_frequency_response_together(tmp_path: Path) -> None:
+    data = Path(__file__).resolve().parents[2] / "data" / "elevation"
+    output = tmp_path / "model.json"
+    files = [data / "synthetic_test_1_raw.csv", data / "synthetic_test_1_frf.csv"]
+    result = _fit(*files, "--modes", 2, "--output", output)
+    assert result.exit_code == 0, result.output
+    assert read_model(str(output)).fit["synthetic"] is True
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_figure_and_the_same_bytes_twice(tmp_path: Path, sweeps: list[Path], suffix: str) -> None:
+    written = []
+    for turn in ("a", "b"):
+        model, figure = tmp_path / f"{turn}.json", tmp_path / f"{turn}{suffix}"
+        result = _fit(*sweeps, "--modes", 1, "--output", model, "--figure", figure)
+        assert result.exit_code == 0, result.output
+        written.append((model.read_bytes(), figure.read_bytes()))
+    assert written[0] == written[1]
+
+
+def _refused(result: Result, folder: Path, *words: str) -> None:
+    """One sentence on stderr, status 2, no traceback, no file but the input."""
+    assert result.exit_code == 2
+    assert isinstance(result.exception, SystemExit)
+    assert result.stdout == ""
+    assert "Traceback" not in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    for word in words:
+        assert word in result.stderr
+    assert sorted(path.name for path in folder.iterdir()) == ["bad.csv"]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("", ["bad.csv", "no header"]),
+        ("time_s,output\n0,1\n", ["bad.csv, line 1", "time_s, input, output"]),
+        ("frequency_hz,real,imag\n1,2,x\n", ["bad.csv, line 2", "imag is 'x'", "a finite number"]),
+        ("frequency_hz,real,imag\n1,2,nan\n", ["bad.csv, line 2", "imag is 'nan'"]),
+        ("frequency_hz,real,imag\n2,1,1\n1,1,1\n", ["bad.csv, line 3", "frequency_hz is 1"]),
+        ("frequency_hz,real,imag\n1,1,1\n", ["bad.csv", "holds 1 frequencies", "8 or more"]),
+        ("time_s,input,output\n" + "".join(f"{k},1,{k % 5}\n" for k in range(300)), ["the input is 1 throughout"]),
+    ],
+)
+def test_bad_files(tmp_path: Path, content: str, words: list[str]) -> None:
+    bad = tmp_path / "bad.csv"
+    bad.write_text(content, encoding="utf-8")
+    _refused(_fit(bad, "--output", tmp_path / "model.json", "--figure", tmp_path / "fit.png"), tmp_path, *words)
+
+
+def test_missing_file_and_missing_folder(tmp_path: Path) -> None:
+    bad = _sweep(tmp_path / "bad.csv", 0)
+    _refused(_fit(tmp_path / "no.csv", "--output", tmp_path / "model.json"), tmp_path, "no.csv: no such file")
+    model = tmp_path / "model.json"
+    nowhere = tmp_path / "none" / "fit.png"
+    _refused(_fit(bad, "--output", model, "--figure", nowhere), tmp_path, "cannot be written")
+
+
+def test_data_that_cannot_carry_the_parameters(tmp_path: Path) -> None:
+    bad = _sweep(tmp_path / "bad.csv", 0, lines=12)
+    _refused(_fit(bad, "--modes", 3, "--output", tmp_path / "model.json"), tmp_path, "holds 12 lines", "16 or more")
+
+
+def test_figure_of_another_kind(tmp_path: Path) -> None:
+    bad = _sweep(tmp_path / "bad.csv", 0)
+    figure = tmp_path / "fit.gif"
+    _refused(_fit(bad, "--output", tmp_path / "m.json", "--figure", figure), tmp_path, "'.gif'", ".pdf, .svg, .png")
+
+
+@pytest.mark.parametrize("modes", ["-1", "x", "2.5", "9", ""])
+def test_modes_is_a_usage_error(tmp_path: Path, modes: str) -> None:
+    bad = _sweep(tmp_path / "bad.csv", 0)
+    result = _fit(bad, "--output", tmp_path / "model.json", f"--modes={modes}")
+    assert result.exit_code == 2
+    assert "expected auto or an integer from 0 to 8" in result.stderr
+    assert "Traceback" not in result.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.csv"]
