@@ -68,7 +68,8 @@ def washout(bound: AdditiveBound, rate: float) -> AntiWindup:
     1 + theta1~ = s (s^2 + 2 zeta omega s + omega^2) / ((s + rate)(s + omega)^2),
 
     omega and zeta being those of W_a: the zero at s = 0 takes the plant's integrator out of theta2, so that
-    y_d dies away after the actuator has left saturation, and the notch cancels the resonance of the bound.
+    y_d dies away after the actuator has left saturation, and the notch cancels the resonance of the bound. A
+    bound without resonance (zeta >= 1) has nothing to cancel: 1 + theta1~ = s/(s + rate).
     This is our choice within the class that theta1~(0) = -1 leaves; the thesis prints (2.23) only.
 
     Parameters
@@ -81,12 +82,12 @@ def washout(bound: AdditiveBound, rate: float) -> AntiWindup:
     if not (np.isfinite(rate) and rate > 0):
         raise InputError(f"the recovery rate is {rate:g}; expected a positive number of 1/s")
     omega, zeta = bound.omega, bound.zeta
+    if zeta >= 1:
+        return AntiWindup(Block(-rate, (), (complex(-rate),)), Block(1.0, (0j,), (complex(-rate),)))
     notch = bound_block(bound).poles
     poles = (complex(-rate), complex(-omega), complex(-omega))
     # numerator - denominator = -((rate + 2 (1 - zeta) omega) s^2 + 2 omega rate s + rate omega^2)
     leading = rate + 2 * (1 - zeta) * omega
-    if leading <= 0:
-        raise InputError(f"W_a has zeta = {zeta:g}; expected a resonance (zeta < 1) for the corrected anti-windup")
     zeros = np.roots([1.0, 2 * omega * rate / leading, rate * omega**2 / leading])
     return AntiWindup(
         theta1_tilde=Block(-leading, tuple(complex(zero) for zero in zeros), poles),
@@ -180,8 +181,9 @@ def popov_sector(theta1_tilde: Block) -> tuple[float, float]:
     Returns
     -------
     k, multiplier
-        k is infinite when the left side without 1/k is never negative; a dead zone lies in the sector k < 1
-        for bounded signals and reaches k = 1 only as u grows without bound. The multiplier is in seconds.
+        The condition holds for every sector below k; k is infinite when the left side without 1/k is never
+        negative. A dead zone lies in a sector below 1 for bounded signals and reaches 1 only as u grows without
+        bound, so that k = 1, which theta1~(0) = -1 implies, is the boundary case. The multiplier is in seconds.
     """
     grid = frequency_grid(theta1_tilde.zeros + theta1_tilde.poles)
     values = theta1_tilde(1j * grid)
@@ -191,7 +193,7 @@ def popov_sector(theta1_tilde: Block) -> tuple[float, float]:
         return min(at_zero, float(np.min(values.real - multiplier * grid * values.imag)))
 
     time_constants = [1 / abs(pole) for pole in theta1_tilde.poles]
-    trials = np.concatenate([[0.0], np.geomspace(1e-3 * min(time_constants), 1e3 * max(time_constants), 200)])
+    trials = np.geomspace(1e-3 * min(time_constants), 1e3 * max(time_constants), 200)
     heights = [lowest(trial) for trial in trials]
     k = int(np.argmax(heights))
     found = minimize_scalar(

@@ -43,7 +43,7 @@ class Block:
             raise InputError(f"a block has the delay {self.delay_s:g} s; expected zero or more (it must be causal)")
 
     def __call__(self, s: ArrayLike) -> Complex:
-        """Evaluate at complex frequencies ``s`` (any shape, rad/s); infinite at a pole."""
+        """Evaluate at complex frequencies ``s`` (any shape, rad/s); not finite at a pole."""
         s = np.asarray(s, dtype=complex)
         value = np.full(s.shape, self.gain, dtype=complex)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -178,6 +178,7 @@ def geometric_scale(*blocks: Block) -> float:
 def _paired(roots: Iterable[complex]) -> tuple[complex, ...]:
     """Sort roots and make conjugate pairs exact; raises InputError when a complex root has no partner."""
     waiting = [complex(root) for root in roots]
+    count = len(waiting)
     if not all(math.isfinite(root.real) and math.isfinite(root.imag) for root in waiting):
         raise InputError(f"a block has the roots {waiting}; expected finite numbers")
     result: list[complex] = []
@@ -194,6 +195,6 @@ def _paired(roots: Iterable[complex]) -> tuple[complex, ...]:
                 raise InputError(f"a block's root {root:g} has no conjugate partner; expected real coefficients")
             waiting.remove(partner)
             result += [root, root.conjugate()]
-    if len(result) != len(list(roots)):
+    if len(result) != count:
         raise InputError(f"a block's roots {waiting} are not closed under conjugation; expected real coefficients")
     return tuple(result)

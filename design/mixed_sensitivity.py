@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import LinAlgError, eigvals, schur, solve_continuous_are, solve_continuous_lyapunov
-from scipy.optimize import linear_sum_assignment
 
 from design.block import Block, geometric_scale
-from design.frequency import frequency_grid, peak
+from design.factorisation import balance, to_block, without
+from design.frequency import peak
 from design.realization import realize
 from identification.files import InputError
 
@@ -169,7 +169,7 @@ def _assemble(G: Block, W1: Block, W2: Block) -> _GeneralisedPlant:
     B = np.stack([np.concatenate([np.zeros(n), w.b]), np.concatenate([g.b, -w.b * Dg])], axis=1)
     C = np.block([[-w.d[0] * Cg, w.C[0]], [g.C[1], np.zeros(m)], [-Cg, np.zeros(m)]])
     rho = np.linalg.norm(D12)
-    t = _balance(A / q, B / q / [1.0, rho], C)
+    t = balance(A / q, B / q / [1.0, rho], C)
     return _GeneralisedPlant(
         A=A / q / t[:, None] * t,
         B1=B[:, :1] / q / t[:, None],
@@ -181,19 +181,6 @@ def _assemble(G: Block, W1: Block, W2: Block) -> _GeneralisedPlant:
         D22=-Dg,
         q=q,
     )
-
-
-def _balance(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> np.ndarray:
-    """Diagonal t (n,) such that in x = t z the rows of [A B] and the columns of [A; C] are of like size."""
-    t = np.ones(len(A))
-    off = np.abs(A - np.diag(np.diag(A)))
-    for _ in range(20):
-        for k in range(len(A)):
-            row = np.sum(off[k] * t) / t[k] + np.sum(np.abs(B[k])) / t[k]
-            column = np.sum(off[:, k] / t) * t[k] + np.sum(np.abs(C[:, k])) * t[k]
-            if row > 0 and column > 0:
-                t[k] *= np.sqrt(row / column)
-    return t
 
 
 def _bisect(G: Block, W1: Block, W2: Block) -> tuple[float, Block]:
@@ -218,7 +205,7 @@ def _bisect(G: Block, W1: Block, W2: Block) -> tuple[float, Block]:
     controller = _central(plant, high * (1 + SUBOPTIMALITY))
     if controller is None:
         raise SynthesisError("the feasibility of the mixed sensitivity problem is not monotonic in gamma")
-    return low, _without(_to_block(*controller, plant.q), W1.poles)
+    return low, without(to_block(*controller, plant.q), W1.poles)
 
 
 def _central(plant: _GeneralisedPlant, gamma: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float] | None:
@@ -307,43 +294,3 @@ def _filter_riccati(A: np.ndarray, C1: np.ndarray, C2: np.ndarray, gamma: float)
     if np.linalg.eigvalsh(Z)[0] <= 0:
         return None
     return V @ np.linalg.solve(Z, V.T)
-
-
-def _to_block(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: float, q: float) -> Block:
-    """Zeros, poles and gain of a single-input single-output state space whose time unit is 1/q."""
-    t = _balance(A, B, C)
-    A, B, C = A / t[:, None] * t, B / t[:, None], C * t
-    poles = eigvals(A)
-    n = len(A)
-    pencil = np.block([[A, B], [C, np.array([[D]])]])
-    mass = np.diag([1.0] * n + [0.0])
-    zeros = eigvals(pencil, mass)
-    finite = zeros[np.isfinite(zeros) & (np.abs(zeros) < 1e9 * max(1.0, float(np.abs(poles).max())))]
-    at = 1.7 * float(np.abs(poles).max())  # right of every pole
-    value = float((C @ np.linalg.solve(at * np.eye(n) - A, B)).item() + D)
-    gain = value * np.real(np.prod(at - poles)) / np.real(np.prod(at - finite))
-    return Block(gain * q ** (n - len(finite)), tuple(finite * q), tuple(poles * q))
-
-
-def _without(block: Block, poles: tuple[complex, ...]) -> Block:
-    """Cancel these poles against the zeros nearest to them, if the response stays as it is within 1e-3.
-
-    The optimal controller has zeros at the mirror images of the poles of G in the axis and has the poles of
-    W1. Where W1 has its poles at the mirror images both cancel, but for rounding. Everything that is said of
-    the controller afterwards is computed from what remains.
-    """
-    if not poles or len(block.zeros) < len(poles):
-        return block
-    zeros = np.array(block.zeros)
-    _, near_zeros = linear_sum_assignment(np.abs(np.subtract.outer(np.array(poles), zeros)))
-    _, near_poles = linear_sum_assignment(np.abs(np.subtract.outer(np.array(poles), np.array(block.poles))))
-    try:
-        smaller = Block(
-            block.gain,
-            tuple(np.delete(zeros, near_zeros)),
-            tuple(np.delete(np.array(block.poles), near_poles)),
-        )
-    except InputError:  # not closed under conjugation: these were no cancellations
-        return block
-    s = 1j * frequency_grid(block.zeros + block.poles, per_decade=20)
-    return smaller if np.max(np.abs(smaller(s) / block(s) - 1)) < 1e-3 else block

@@ -65,7 +65,7 @@ class Run:
     modes: np.ndarray
 
 
-class DivergenceError(ArithmeticError):
+class DivergenceError(InputError):
     """A signal of the loop passed 1e100."""
 
 
@@ -84,7 +84,7 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
     Raises
     ------
     InputError
-        The limits are not in order or the times not increasing.
+        The limits are not in order, the times not increasing, or the control chatters past all bounds.
     DivergenceError
         The loop diverges.
 
@@ -139,7 +139,7 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
     if status == taylor.DIVERGED:
         raise DivergenceError(f"the loop diverges: a signal passed 1e100 at t = {end:.6g} s")
     if status != taylor.COMPLETE or tail > 1e-11:
-        raise ArithmeticError(f"the loop could not be integrated: {len(events)} events up to t = {end:.6g} s")
+        raise InputError(f"the loop could not be integrated: {len(events)} events up to t = {end:.6g} s")
     return Run(
         time_s=time_s,
         control=values[:, 0],

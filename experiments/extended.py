@@ -32,7 +32,7 @@ def extended_tables(design: Design) -> dict[str, pd.DataFrame]:
     Notes
     -----
     Chapter 4 prints no limits. It says of the loop without anti-windup that "until around 4 seconds, the
-    system operates in the nonlinear region"; the limit is the one that makes this so, see
+    system operates in the nonlinear region"; the limit is the one that comes nearest to this, see
     :func:`limit_for_last_saturation`.
     """
     reference = thesis_reference("extended", design.reference_omega)
@@ -49,7 +49,7 @@ def extended_tables(design: Design) -> dict[str, pd.DataFrame]:
 
 
 def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: float, horizon_s: float) -> float:
-    """The limit +-L under which the loop leaves saturation for good at ``target_s``.
+    """The limit +-L under which the loop leaves saturation for good nearest to ``target_s``.
 
     Parameters
     ----------
@@ -69,8 +69,9 @@ def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: fl
 
     Notes
     -----
-    The time of the last saturation falls with L, but in jumps where a whole excursion disappears; bisection
-    ends at the crossing of ``target_s``, and of the two ends the one nearer in time is returned.
+    The time of the last saturation falls with L, but in jumps where a whole excursion disappears, so that
+    ``target_s`` itself need not occur. Bisection ends at a crossing of ``target_s`` (should there be several, at
+    one of them), and of the two ends, 1e-6 apart, the one nearer in time is returned.
     """
 
     def last(limit: float) -> float:

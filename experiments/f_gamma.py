@@ -22,7 +22,8 @@ def f_gamma_tables(bound: AdditiveBound) -> dict[str, pd.DataFrame]:
     -------
     dict
         ``f_gamma``: alpha, beta, gamma, f, one row a point. ``f_gamma_summary``: one row; the thesis's choice
-        (beta from the coarse grid) and the least f over a continuous beta.
+        (beta from the coarse grid) and the least f over a continuous beta between alpha/8 and 4 alpha. (With the
+        thesis's bound f keeps rising beyond, to 6.5 at beta = 1.)
     """
     alpha, beta, gamma = thesis_choice(bound)
     rows = []

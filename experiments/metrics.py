@@ -26,6 +26,6 @@ def settling_time(time_s: np.ndarray, error: np.ndarray, band: float) -> float:
 
 
 def over_last(time_s: np.ndarray, error: np.ndarray, span_s: float) -> tuple[float, float]:
-    """Offset (mean of the extremes) and amplitude (half their distance) of the error over the last ``span_s``."""
+    """Offset (middle between the extremes) and ripple (half their distance) of the error over the last ``span_s``."""
     tail = error[time_s >= time_s[-1] - span_s]
     return float((tail.max() + tail.min()) / 2), float((tail.max() - tail.min()) / 2)

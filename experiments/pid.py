@@ -30,7 +30,8 @@ def pid_tables() -> dict[str, pd.DataFrame]:
 
     Notes
     -----
-    As printed the loop limit-cycles; the text's description fits the swapped gains.
+    As printed the loop limit-cycles, and it still oscillates with back-calculation; the text's description fits the
+    swapped gains.
     """
     values = printed()["pid"]
     as_printed = PidBenchmark(

@@ -67,7 +67,7 @@ def tracking_summary(runs: Mapping[str, Run], limit: float, reference: Reference
     DataFrame
         run, limit, required, last_saturation_s (empty: saturated to the end), settling_s (error within 1 % of the
         reference's amplitude, measured from the lasting offset of the error; empty: never), offset and
-        ripple (mean and half distance of the extremes of the error over the last period), peak_error_after_1s,
+        ripple (middle and half distance of the extremes of the error over the last period), peak_error_after_1s,
         relative_error_percent (largest error of the last period over the reference's amplitude).
     """
     rows = []

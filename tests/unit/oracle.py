@@ -28,7 +28,7 @@ def reference_run(
         for j, delay in enumerate(loop.delays):
             past = t - delay
             if past > 0:
-                start, end, dense = next(piece for piece in reversed(pieces) if piece[0] <= past)
+                _, end, dense = next(piece for piece in reversed(pieces) if piece[0] <= past)
                 w[j] = loop.Z[j] @ dense(min(past, end))  # past the end by rounding only
         return w
 
@@ -72,10 +72,8 @@ def reference_run(
             states[k] = solution.sol(time_s[k])
             u_out[k] = control(time_s[k], states[k])
         if solution.status == 1:
-            if mode != 0:
-                mode = 0
-            else:
-                mode = 1 if len(solution.t_events[guards.index(upper)]) else -1
+            rose = mode == 0 and len(solution.t_events[guards.index(upper)]) > 0
+            mode = 0 if mode != 0 else 1 if rose else -1
             mesh = {m for m in mesh if m > stop - 8 * loop.delays.max()} | {stop}
         t, x = stop, solution.y[:, -1]
     return u_out, {name: states @ x for name, (x, w) in loop.outputs.items() if not np.any(w)}

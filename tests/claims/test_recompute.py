@@ -1,0 +1,127 @@
+"""How a verdict comes about: digits, rounding of the inputs, NaN, and what is refused; and the command line."""
+
+import math
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from experiments.__main__ import main
+from experiments.claims import COLUMNS, read_ledger, recompute
+from experiments.claims_inputs import rounded_inputs
+from experiments.printed_number import PrintedNumber, read_number
+from identification.files import InputError
+
+THETA2 = "experiments.claims_transfer_functions:theta2"
+GAMMA_OPT = "experiments.claims_parameters:gamma_opt"
+
+
+def one_row(printed: str, compute: str = THETA2, row_id: str = "theta2.gain") -> pd.DataFrame:
+    row = dict.fromkeys(COLUMNS, "") | {"id": row_id, "printed": printed, "compute": compute}
+    return pd.DataFrame([row])
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "half_unit"),
+    [
+        ("7.1", 7.1, 0.05),
+        ("175", 175.0, 0.5),
+        ("5.687e15", 5.687e15, 5e11),
+        ("3.062e4", 30620.0, 5.0),
+        ("8.1e-3", 8.1e-3, 5e-5),
+        ("-1.02e-10", -1.02e-10, 5e-13),
+        ("1/40", 0.025, 0.0),
+        ("no", 0.0, 0.5),
+    ],
+)
+def test_digits(text: str, value: float, half_unit: float):
+    assert read_number(text) == PrintedNumber(value, pytest.approx(half_unit, rel=1e-12))
+
+
+@pytest.mark.parametrize("text", ["", "about 4", "nan", "inf", "1/0", "1/x"])
+def test_text_that_is_no_number_is_refused(text: str):
+    with pytest.raises(InputError, match="is not a number"):
+        read_number(text)
+
+
+def test_rounded_inputs_have_the_digits_of_the_data(ledger: pd.DataFrame):
+    inputs = rounded_inputs(ledger)
+    assert inputs["implied.gain"] == PrintedNumber(7.105, pytest.approx(0.0005))
+    assert inputs["implied.pole_modes.0.omega"] == PrintedNumber(282.0, 0.5)
+    assert inputs["printed.theta2.gain"] == PrintedNumber(19.659, pytest.approx(0.0005))
+
+
+def test_inputs_rounding_counts_only_outside_the_printed_digits():
+    """19.659 comes out as 19.65906; K = 7.105 and the frequencies, known to half a unit, allow 0.226 around it."""
+    within = recompute(one_row("19.659")).iloc[0]
+    assert within["verdict"] == "agrees"
+    assert within["tolerance"] == pytest.approx(0.0005, rel=1e-4)
+    rounded = recompute(one_row("19.700")).iloc[0]
+    assert rounded["verdict"] == "agrees"
+    # d ln gain = dK/K + 2 d omega/omega over the four modes
+    by_hand = 19.65906 * (0.0005 / 7.105 + 2 * 0.5 * (1 / 175 + 1 / 930 + 1 / 282 + 1 / 960))
+    assert rounded["tolerance"] == pytest.approx(0.0005 + by_hand, rel=0.01)
+    # what Table 2.1 gives is further away than that
+    assert recompute(one_row("20.065")).iloc[0]["verdict"] == "differs"
+
+
+def test_nan_is_not_reproducible():
+    row = recompute(one_row("0.0684", GAMMA_OPT, "delay_free.gamma_opt")).iloc[0]
+    assert math.isnan(row["computed"])
+    assert row["verdict"] == "not_reproducible"
+
+
+def test_without_compute_a_row_is_an_input():
+    row = recompute(one_row("7.1", "")).iloc[0]
+    assert row["verdict"] == "input"
+    assert math.isnan(row["computed"])
+
+
+@pytest.mark.parametrize("name", ["experiments.claims_parameters:nothing", "no_such_module:f", "theta2"])
+def test_unknown_function_is_refused(name: str):
+    with pytest.raises(InputError, match="cannot be imported"):
+        recompute(one_row("1", name))
+
+
+def test_unknown_id_is_refused():
+    with pytest.raises(InputError, match=r"expected 'theta2\.phase'"):
+        recompute(one_row("1", row_id="theta2.phase"))
+
+
+def test_ledger_with_other_columns_is_refused(tmp_path: Path):
+    path = tmp_path / "claims.csv"
+    path.write_text("id,printed\n", encoding="utf-8")
+    with pytest.raises(InputError, match="the columns are id, printed"):
+        read_ledger(path)
+    with pytest.raises(InputError, match="no such file"):
+        read_ledger(tmp_path / "absent.csv")
+
+
+@pytest.fixture
+def small_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    table = pd.concat([one_row("19.659").assign(status="agrees"), one_row("7.1", "", "K").assign(status="input")])
+    monkeypatch.setattr("experiments.__main__.read_ledger", lambda: table.reset_index(drop=True))
+    return tmp_path
+
+
+def test_command_writes_the_table_and_prints_counts(small_ledger: Path):
+    result = CliRunner().invoke(main, ["claims", "--output", str(small_ledger)])
+    assert result.exit_code == 0
+    assert [line.split() for line in result.output.splitlines()[1:]] == [["agrees", "1"], ["input", "1"]]
+    written = pd.read_csv(small_ledger / "claims.csv")
+    assert tuple(written.columns) == (*COLUMNS, "computed", "half_unit", "tolerance", "verdict")
+    assert written["computed"].iloc[0] == pytest.approx(19.65906, abs=1e-5)
+
+
+def test_command_names_the_rows_whose_status_is_out_of_date(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("experiments.__main__.read_ledger", lambda: one_row("19.659").assign(status="differs"))
+    result = CliRunner().invoke(main, ["claims", "--output", str(tmp_path)])
+    assert result.exit_code == 0
+    assert "theta2.gain: the ledger says differs, recomputed it agrees" in result.output
+
+
+def test_command_refuses_a_missing_folder(small_ledger: Path):
+    result = CliRunner().invoke(main, ["claims", "--output", str(small_ledger / "absent")])
+    assert result.exit_code == 2
+    assert "no such folder" in result.output
