@@ -1,0 +1,127 @@
+"""Identities of Fig. 2.6 that hold whatever saturates, simulated without using them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from design.anti_windup import AntiWindup, second_order, washout
+from design.contract import Design
+from experiments.closed_loop import simulate
+from experiments.loops import design_loop
+from experiments.metrics import last_saturation
+from experiments.pade import with_pade
+from experiments.scenarios import Reference, thesis_reference
+
+LIMITS = st.floats(8.0, 40.0)
+FREE = (-np.inf, np.inf)
+quick = settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def compensator(design: Design, kind: str, gamma: float) -> AntiWindup:
+    return second_order(0.05, 0.025, gamma) if kind == "thesis" else washout(design.additive_bound, 4.0)
+
+
+@pytest.mark.parametrize("kind", ["thesis", "corrected"])
+@pytest.mark.parametrize("which", ["extended_design", "delay_free_design"])
+@quick
+@given(limit=LIMITS, gamma=st.floats(-0.9, 150.0), omega=st.floats(0.3, 6.0), offset=st.floats(-60.0, 60.0))
+def test_y_plus_y_d_is_the_linear_response(
+    request: pytest.FixtureRequest, which: str, kind: str, limit: float, gamma: float, omega: float, offset: float
+) -> None:
+    """Lemma 2: y_lin = G_A u_lin, saturation or not; and v is the control of the linear loop."""
+    design = request.getfixturevalue(which)
+    loop = design_loop(design, Reference(50.0, omega, 0.4, offset), compensator(design, kind, gamma))
+    t = np.linspace(0, 3, 301)
+    saturated, linear = simulate(loop, (-limit, limit), t), simulate(loop, FREE, t)
+    assert len(saturated.events_s) > 0
+    scale = np.abs(linear.outputs["output"]).max()
+    np.testing.assert_allclose(saturated.outputs["y_lin"], linear.outputs["output"], rtol=0, atol=1e-8 * scale)
+    control = np.abs(linear.control).max()
+    np.testing.assert_allclose(saturated.outputs["v"], linear.control, rtol=0, atol=1e-8 * control)
+
+
+@quick
+@given(limit=LIMITS)
+def test_without_saturation_every_anti_windup_is_the_same(extended_design: Design, limit: float) -> None:
+    reference = Reference(0.02 * limit, 1.5, 0.0, 0.0)
+    t = np.linspace(0, 2, 101)
+    runs = [
+        simulate(design_loop(extended_design, reference, kind), (-limit, limit), t)
+        for kind in (None, extended_design.thesis_anti_windup(), extended_design.corrected_anti_windup())
+    ]
+    for run in runs:
+        assert len(run.events_s) == 0
+        np.testing.assert_allclose(run.outputs["output"], runs[0].outputs["output"], rtol=0, atol=1e-11 * limit)
+
+
+def test_loop_is_homogeneous(extended_design: Design) -> None:
+    # reference and limits times c: every signal times c
+    t = np.linspace(0, 3, 301)
+    small, large = (
+        simulate(
+            design_loop(extended_design, Reference(c * 50.0, 1.5, 1.2, 0.0), extended_design.thesis_anti_windup()),
+            (-c * 12.0, c * 12.0),
+            t,
+        )
+        for c in (1.0, 1000.0)
+    )
+    np.testing.assert_allclose(large.outputs["output"], 1000 * small.outputs["output"], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(large.events_s, small.events_s, rtol=0, atol=1e-9)
+
+
+def test_offset_is_the_integral_of_what_the_actuator_left_out(extended_design: Design) -> None:
+    """y - r -> -K (1 + gamma) * integral of u_tilde: the thesis's lasting offset; none with theta1~(0) = -1."""
+    reference = thesis_reference("extended", 1.5)
+    t = np.linspace(0, 25, 250_001)
+    kind = extended_design.thesis_anti_windup()
+    run = simulate(design_loop(extended_design, reference, kind), (-12.0, 12.0), t)
+    excess = np.trapezoid(run.control - run.saturated_control, t)
+    gain = extended_design.plant.gain * float(kind.one_plus(0j).real)
+    error = run.outputs["error"][-1]
+    assert abs(error) > 10
+    assert error == pytest.approx(gain * excess, rel=1e-3)  # trapezoids of a kinked signal
+    corrected = design_loop(extended_design, reference, extended_design.corrected_anti_windup())
+    assert abs(simulate(corrected, (-12.0, 12.0), np.array([0.0, 25.0])).outputs["error"][-1]) < 1e-6
+
+
+def test_last_saturation_without_anti_windup(extended_design: Design) -> None:
+    """8.03 s, 3.80 s and 1.84 s under limits of 12, 13 and 15, known from an independent program."""
+    loop = design_loop(extended_design, thesis_reference("extended", 1.5), None)
+    times = [last_saturation(simulate(loop, (-limit, limit), np.array([0.0, 20.0]))) for limit in (12.0, 13.0, 15.0)]
+    np.testing.assert_allclose(times, [8.03, 3.80, 1.84], atol=0.005)
+
+
+def test_pade_converges_to_the_exact_dead_time(extended_design: Design) -> None:
+    """Section 4.2: "larger n gives more accurate equivalent of the dead-time"."""
+    loop = design_loop(extended_design, thesis_reference("extended", 1.5), None)
+    t = np.linspace(0, 3, 301)
+    exact = simulate(loop, (-15.0, 15.0), t).outputs["output"]
+    approximate = [simulate(with_pade(loop, order), (-15.0, 15.0), t).outputs["output"] for order in (1, 2, 3)]
+    errors = [np.abs(output - exact).max() for output in approximate]
+    assert errors[0] > errors[1] > errors[2]
+
+
+def test_chapter_two_without_anti_windup_does_not_follow(delay_free_design: Design) -> None:
+    """Fig. 2.14; and the corrected compensator keeps the error within what the limit allows."""
+    reference = thesis_reference("delay-free", delay_free_design.reference_omega)
+    t = np.linspace(0, 24, 2401)
+    without = simulate(design_loop(delay_free_design, reference, None), (-10.0, 10.0), t).outputs["error"]
+    kind = delay_free_design.corrected_anti_windup()
+    corrected = simulate(design_loop(delay_free_design, reference, kind), (-10.0, 10.0), t).outputs["error"]
+    assert np.abs(without[t > 20]).max() > 50
+    assert np.abs(corrected[t > 20]).max() < 5
+
+
+def test_chapter_two_hides_the_plants_integrator(delay_free_design: Design) -> None:
+    """C = K A/Lambda has a zero where the plant has its pole: P S keeps the pole at 0, as Lemma 1 (A stable) warns."""
+    from design.delay_free import controller
+
+    C = controller(delay_free_design)
+    assert 0j in C.zeros
+    P = delay_free_design.plant.without_delay()
+    s = np.array([1e-6, 1e-7])
+    P_S = P(s) / (1 + P(s) * C(s))
+    assert abs(P_S[1] / P_S[0]) == pytest.approx(10.0, rel=1e-3)

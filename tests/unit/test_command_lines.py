@@ -1,0 +1,198 @@
+"""Every command answers bad input with one sentence and status 2, and writes nothing."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner, Result
+
+from design.__main__ import main as design_main
+from design.contract import Design
+from experiments.__main__ import main as experiments_main
+from identification.model import read_model
+
+
+@pytest.fixture
+def runner() -> CliRunner:
+    return CliRunner()
+
+
+@pytest.fixture
+def extended_json(extended_design: Design, tmp_path: Path) -> Path:
+    path = tmp_path / "extended.json"
+    path.write_text(extended_design.to_json(), encoding="utf-8")
+    return path
+
+
+def refused(result: Result, *parts: str) -> None:
+    """One sentence on stderr that names what is wrong, status 2, no traceback."""
+    assert result.exit_code == 2, result.output
+    assert isinstance(result.exception, SystemExit)
+    lines = [line for line in result.stderr.splitlines() if line.startswith("Error:")]
+    assert len(lines) == 1
+    assert "Traceback" not in result.output
+    for part in parts:
+        assert part in lines[0]
+
+
+DESIGN_COMMANDS = {
+    "delay-free": ["--period", "4"],
+    "extended": ["--reference-omega", "1.5", "--a", "4", "--e", "2", "--f", "1"],
+}
+
+
+@pytest.mark.parametrize("command", DESIGN_COMMANDS)
+@pytest.mark.parametrize(
+    ("content", "parts"),
+    [
+        (None, ["no such file"]),
+        ("not json", ["line 1", "not JSON"]),
+        ('{"schema": 7}', ["schema is 7", "expected 1"]),
+        ('{"schema": 1, "plant": {"gain": NaN}}', ["NaN"]),
+        ('{"schema": 1}', ["'plant'", "expected an object"]),
+    ],
+)
+def test_design_refuses_bad_models(
+    runner: CliRunner, tmp_path: Path, command: str, content: str | None, parts: list[str]
+) -> None:
+    model, output = tmp_path / "model.json", tmp_path / "design.json"
+    if content is not None:
+        model.write_text(content, encoding="utf-8")
+    result = runner.invoke(design_main, [command, str(model), *DESIGN_COMMANDS[command], "--output", str(output)])
+    refused(result, "model.json", *parts)
+    assert not output.exists()
+
+
+@pytest.mark.parametrize(
+    ("member", "value", "part"),
+    [("gain", "seven", "expected a number"), ("gain", 0, "gain is 0"), ("delay_s", -0.1, "delay_s is -0.1")],
+)
+def test_design_refuses_bad_plants(runner: CliRunner, tmp_path: Path, member: str, value: object, part: str) -> None:
+    content = json.loads(read_model("implied").to_json())
+    content["plant"][member] = value
+    model = tmp_path / "model.json"
+    model.write_text(json.dumps(content), encoding="utf-8")
+    output = tmp_path / "design.json"
+    result = runner.invoke(design_main, ["delay-free", str(model), "--period", "4", "--output", str(output)])
+    refused(result, "model.json", part)
+    assert not output.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["delay-free", "implied", "--period", "-4"], "period"),
+        (["delay-free", "implied", "--period", "nan"], "period"),
+        (["delay-free", "implied", "--period", "4", "--epsilon", "99"], "epsilon"),
+        (["extended", "implied", "--reference-omega", "0", "--a", "4", "--e", "2", "--f", "1"], "omega"),
+        (["extended", "implied", "--reference-omega", "1.5", "--a", "4", "--e", "-2", "--f", "1"], "unstable"),
+        (
+            [
+                "extended",
+                "implied",
+                "--reference-omega",
+                "1.5",
+                "--a",
+                "4",
+                "--e",
+                "2",
+                "--f",
+                "1",
+                "--method",
+                "poles",
+            ],
+            "unstable poles",
+        ),
+    ],
+)
+def test_design_refuses_bad_numbers(runner: CliRunner, tmp_path: Path, arguments: list[str], part: str) -> None:
+    output = tmp_path / "design.json"
+    refused(runner.invoke(design_main, [*arguments, "--output", str(output)]), part)
+    assert not output.exists()
+
+
+def test_design_refuses_a_missing_folder(runner: CliRunner, tmp_path: Path) -> None:
+    output = tmp_path / "nowhere" / "design.json"
+    result = runner.invoke(design_main, ["delay-free", "implied", "--period", "4", "--output", str(output)])
+    refused(result, "cannot be written")
+
+
+SIMULATE = ["--limit", "12", "--anti-windup", "thesis", "--until", "1", "--sample-time", "0.01"]
+
+
+def test_simulate_writes_what_it_promises(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
+    output = tmp_path / "run.csv"
+    result = runner.invoke(experiments_main, ["simulate", str(extended_json), *SIMULATE, "--output", str(output)])
+    assert result.exit_code == 0, result.output
+    table = pd.read_csv(output)
+    assert list(table) == ["time_s", "reference", "output", "error", "control", "saturated_control"]
+    assert len(table) == 101
+    np.testing.assert_allclose(table["error"], table["reference"] - table["output"], atol=1e-9)
+    np.testing.assert_allclose(table["saturated_control"], table["control"].clip(-12, 12), atol=1e-9)
+    np.testing.assert_allclose(table["reference"], 50 * np.sin(1.5 * table["time_s"] + np.pi / 2), atol=1e-9)
+
+
+def test_simulate_stops_at_until(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
+    output = tmp_path / "run.csv"
+    arguments = ["--limit", "12", "--anti-windup", "none", "--until", "1", "--sample-time", "0.6"]
+    assert (
+        runner.invoke(experiments_main, ["simulate", str(extended_json), *arguments, "--output", str(output)]).exit_code
+        == 0
+    )
+    assert list(pd.read_csv(output)["time_s"]) == [0.0, 0.6]
+
+
+@pytest.mark.parametrize(
+    ("changes", "part"),
+    [
+        ({"--limit": "-1"}, "--limit is -1"),
+        ({"--limit": "nan"}, "--limit is nan"),
+        ({"--until": "0"}, "--until is 0"),
+        ({"--sample-time": "2"}, "sample time <= until"),
+        ({"--until": "inf"}, "both finite"),
+        ({"--gamma": "5", "--anti-windup": "corrected"}, "--gamma belongs to --anti-windup thesis"),
+        ({"--alpha": "-1"}, "expected alpha > 0"),
+        ({"--amplitude": "nan"}, "expected finite numbers"),
+    ],
+)
+def test_simulate_refuses_bad_numbers(
+    runner: CliRunner, tmp_path: Path, extended_json: Path, changes: dict[str, str], part: str
+) -> None:
+    options = dict(zip(SIMULATE[::2], SIMULATE[1::2], strict=True)) | changes
+    flat = [word for pair in options.items() for word in pair]
+    output = tmp_path / "run.csv"
+    refused(runner.invoke(experiments_main, ["simulate", str(extended_json), *flat, "--output", str(output)]), part)
+    assert not output.exists()
+
+
+@pytest.mark.parametrize("command", ["simulate", "f-gamma", "delay-free", "extended"])
+def test_experiments_refuse_a_missing_design(runner: CliRunner, tmp_path: Path, command: str) -> None:
+    options = (
+        [*SIMULATE, "--output", str(tmp_path / "run.csv")] if command == "simulate" else ["--output", str(tmp_path)]
+    )
+    result = runner.invoke(experiments_main, [command, str(tmp_path / "none.json"), *options])
+    refused(result, "none.json", "no such file")
+    assert not list(tmp_path.iterdir())
+
+
+def test_experiments_refuse_the_other_kind(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
+    result = runner.invoke(experiments_main, ["delay-free", str(extended_json), "--output", str(tmp_path)])
+    refused(result, "kind is 'extended'", "expected 'delay-free'")
+
+
+def test_experiments_refuse_a_missing_block(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
+    content = json.loads(extended_json.read_text(encoding="utf-8"))
+    del content["blocks"]["T_so"]
+    extended_json.write_text(json.dumps(content), encoding="utf-8")
+    result = runner.invoke(experiments_main, ["extended", str(extended_json), "--output", str(tmp_path)])
+    refused(result, "extended.json", "'T_so' is missing")
+
+
+def test_additive_error_refuses_a_missing_sweep(runner: CliRunner, tmp_path: Path) -> None:
+    arguments = ["additive-error", "implied", str(tmp_path / "none.csv"), "--output", str(tmp_path)]
+    refused(runner.invoke(experiments_main, arguments), "none.csv")
+    assert not list(tmp_path.iterdir())
