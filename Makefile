@@ -49,7 +49,7 @@ claims: $(BUILD)/claims.txt ## recompute the numbers that the thesis prints and 
 	@cat $<
 
 test: lint ## check style, types and everything else
-	$(PY) -m pytest -q -n 2
+	$(PY) -m pytest -q -n 2 --dist loadfile
 
 bench: $(READY) ## measure speed as ratios against peers
 	$(PY) -m pytest -q benchmarks --benchmark-only --benchmark-columns=median,iqr,rounds
@@ -107,8 +107,10 @@ $(BUILD)/claims.csv $(BUILD)/claims.txt &: data/thesis/claims.csv $(wildcard exp
 	@mkdir -p $(BUILD)
 	$(PY) -m experiments claims --output $(BUILD) > $(BUILD)/claims.txt
 
+drawing = $(foreach format,$(FORMATS),$(1:%=$(FIGURES)/%.$(format)))
+
 define feeds
-$(foreach format,$(FORMATS),$(2:%=$(FIGURES)/%.$(format))): $(1:%=$(RESULTS)/%.csv) $(1:%=$(RESULTS)/%_summary.csv)
+$(call drawing,$(2)): $(1:%=$(RESULTS)/%.csv) $(1:%=$(RESULTS)/%_summary.csv)
 endef
 $(eval $(call feeds,pid,fig_2_02 fig_2_03 fig_2_04))
 $(eval $(call feeds,additive_error,fig_2_09))
@@ -116,8 +118,13 @@ $(eval $(call feeds,f_gamma,fig_2_10 fig_2_11))
 $(eval $(call feeds,delay_free,fig_2_12 fig_2_13 fig_2_14))
 $(eval $(call feeds,extended,fig_4_01 fig_4_02 fig_4_03 fig_4_04))
 
+$(call drawing,fig_2_02 fig_2_03 fig_2_04): $(addprefix paper_figures/,pid.py panels.py captions.py)
+$(call drawing,fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14): $(addprefix paper_figures/,panels.py captions.py)
+$(call drawing,fig_2_11): paper_figures/fig_2_10.py
+$(call drawing,fig_4_01 fig_4_02 fig_4_03 fig_4_04): $(addprefix paper_figures/,extended.py panels.py captions.py)
+
 DIAGRAMS := fig_2_01 fig_2_05 fig_2_06 fig_2_07 fig_2_08 fig_3_01 fig_3_02
-$(foreach format,$(FORMATS),$(DIAGRAMS:%=$(FIGURES)/%.$(format))): paper_figures/block_diagrams.py
+$(call drawing,$(DIAGRAMS)): paper_figures/block_diagrams.py
 
 STYLE := paper_figures/__main__.py paper_figures/style.py paper_figures/thesis.mplstyle
 $(foreach format,$(FORMATS),$(FIGURES)/%.$(format)): paper_figures/%.py $(STYLE) | $(READY)

@@ -11,7 +11,7 @@ from experiments.tracking import loops, run_all, tracking_summary, tracking_tabl
 from identification.thesis import printed
 
 PERIODS = 6  # the thesis does not print its horizon
-SAMPLES_PER_PERIOD = 1000
+SAMPLES_PER_PERIOD = 4000
 
 
 def delay_free_tables(design: Design) -> dict[str, pd.DataFrame]:

@@ -15,7 +15,7 @@ from identification.files import InputError
 from identification.thesis import printed
 
 PERIODS = 5  # the thesis does not print its horizon
-SAMPLES_PER_PERIOD = 1000
+SAMPLES_PER_PERIOD = 4000
 PADE_ORDER = 2  # section 4.2
 
 

@@ -1,1 +1,6 @@
-"""One module a thesis figure: ``draw(results)`` is pure, ``main()`` reads, draws and saves."""
+"""The figures of the thesis, one module ``fig_x_yy`` each.
+
+A figure module has ``TABLES``, the names of the tables it needs, ``draw(tables)``, which returns the figure and
+touches nothing else, and ``caption(tables)``, which returns its caption. ``tables`` maps the names to data frames.
+The command line reads the tables, draws and saves.
+"""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib import import_module
 from io import StringIO
 from pathlib import Path
+from traceback import walk_tb
 from typing import Protocol, cast
 
 import click
@@ -51,7 +53,7 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
     for name in names:
         module = figure_module(name)
         tables = {table: read_table(results / f"{table}.csv", name) for table in module.TABLES}
-        with style.styled():
+        with style.styled(), missing_columns_named(tables, results, name):
             drawn[name] = module.draw(tables), module.caption(tables)
     for name, (figure, caption) in drawn.items():
         style.save(figure, output, name, caption)
@@ -60,9 +62,7 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
 def figure_names() -> list[str]:
     """Return the names of all figures, in the order of the thesis."""
     return sorted(
-        module.name
-        for module in pkgutil.iter_modules(paper_figures.__path__)
-        if module.name.startswith("fig_")
+        module.name for module in pkgutil.iter_modules(paper_figures.__path__) if module.name.startswith("fig_")
     )
 
 
@@ -92,14 +92,40 @@ def read_table(path: Path, figure: str) -> pd.DataFrame:
     Raises
     ------
     InputError
-        The file is missing or is no table.
+        The file is missing, is no table or has no rows.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such table, which {figure} needs")
     try:
-        return pd.read_csv(StringIO(read_text(path)), comment="#")
+        table = pd.read_csv(StringIO(read_text(path)), comment="#")
     except (pd.errors.ParserError, pd.errors.EmptyDataError):
         raise InputError(f"{path}: not a table of comma-separated values, which {figure} needs") from None
+    if table.empty:
+        raise InputError(f"{path}: no rows below the names of the columns, which {figure} needs")
+    return table
+
+
+@contextmanager
+def missing_columns_named(tables: Mapping[str, pd.DataFrame], results: Path, figure: str) -> Iterator[None]:
+    """Turn the KeyError of a table that lacks a column into a sentence; every other KeyError goes on.
+
+    Raises
+    ------
+    InputError
+        A column that was asked for is missing from one of the tables, or from rows taken out of one.
+    """
+    try:
+        yield
+    except KeyError as error:
+        column = error.args[0]
+        for frame, _ in walk_tb(error.__traceback__):
+            asked = frame.f_locals.get("self")
+            if not isinstance(asked, pd.DataFrame) or column in asked.columns:
+                continue
+            for name, table in tables.items():
+                if asked.columns.equals(table.columns):
+                    raise InputError(f"{results / name}.csv: no column {column}, which {figure} needs") from None
+        raise
 
 
 if __name__ == "__main__":

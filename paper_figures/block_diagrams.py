@@ -162,7 +162,5 @@ def _rectangle(
     return Segment(outline, lw=line, ls=dashes, joinstyle="miter", capstyle="butt")
 
 
-def _text(
-    x: float, y: float, label: str, align: tuple[Halign, Valign], size: float = _TEXT_SIZE
-) -> SegmentText:
+def _text(x: float, y: float, label: str, align: tuple[Halign, Valign], size: float = _TEXT_SIZE) -> SegmentText:
     return SegmentText((x, y), label, align=align, fontsize=size, font="STIXGeneral", mathfont="stix")

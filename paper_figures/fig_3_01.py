@@ -16,9 +16,9 @@ CAPTION = (
     "Smith predictor-based controller structure (thesis Fig. 3.1): the controller C_1(s) of Fig. 3.2 acts "
     "on the error e in a loop with the plant P(s) of Eq. (3.1), which has an integrator and dead time; the "
     "disturbance d is negligible. The text names C_1, P and H but not their places: d at the plant input "
-    "and H(s) in the feedback path are our deduction. The remark that H(s) does not contribute to the "
-    "stability would fit a filter of the reference r as well; with H(s) = 1, which the text takes, the two "
-    "loops are the same."
+    "and H(s) in the feedback path are our deduction, and the label u of the output of C_1(s) is our own. "
+    "The remark that H(s) does not contribute to the stability would fit a filter of the reference r as "
+    "well; with H(s) = 1, which the text takes, the two loops are the same."
 )
 
 

@@ -114,8 +114,7 @@ def save(figure: Figure, folder: Path, name: str, caption: str) -> None:
         The folder does not exist or may not be written to.
     """
     writers: dict[Path, Callable[[Path], object]] = {
-        folder / f"{name}.{kind}": partial(figure.savefig, metadata=metadata)
-        for kind, metadata in _METADATA.items()
+        folder / f"{name}.{kind}": partial(figure.savefig, metadata=metadata) for kind, metadata in _METADATA.items()
     }
     writers[folder / f"{name}.txt"] = lambda path: path.write_text(caption + "\n", encoding="utf-8")
     with styled():

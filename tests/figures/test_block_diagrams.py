@@ -1,16 +1,12 @@
 """The block diagrams: complete, legible, inside the page, and the same bytes on every run."""
 
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from matplotlib.transforms import Bbox
 
-from paper_figures import style
 from paper_figures.__main__ import figure_module
 
 SIGNALS = {
@@ -73,18 +69,6 @@ def texts(figure: Figure) -> list[Text]:
     return [text for axes in figure.axes for text in axes.texts]
 
 
-def extents(figure: Figure) -> list[tuple[str, Bbox]]:
-    """Each text of the figure with its rendered bounding box [in]."""
-    canvas = FigureCanvasAgg(figure)
-    with style.styled():
-        canvas.draw()
-        to_inches = figure.dpi_scale_trans.inverted()
-        return [
-            (text.get_text(), text.get_window_extent(canvas.get_renderer()).transformed(to_inches))
-            for text in texts(figure)
-        ]
-
-
 @each_diagram
 def test_every_signal_and_block_is_named(diagram, name):
     labels = [text.get_text() for text in texts(diagram)]
@@ -99,35 +83,33 @@ def test_junctions_have_their_signs(diagram, name):
 
 
 @each_diagram
-def test_no_text_overlaps_another(diagram):
+def test_no_text_overlaps_another(diagram, extents):
     overlapping = [
         (first, second)
-        for (first, one), (second, other) in combinations(extents(diagram), 2)
+        for (first, one), (second, other) in combinations(extents(diagram, texts), 2)
         if one.padded(0.01).overlaps(other)
     ]
     assert overlapping == []
 
 
 @each_diagram
-def test_no_line_junction_or_arrowhead_touches_a_text(diagram):
+def test_no_line_junction_or_arrowhead_touches_a_text(diagram, extents):
     lines = [line.get_path() for axes in diagram.axes for line in axes.lines]
     lines += [
-        patch.get_patch_transform().transform_path(patch.get_path())
-        for axes in diagram.axes
-        for patch in axes.patches
+        patch.get_patch_transform().transform_path(patch.get_path()) for axes in diagram.axes for patch in axes.patches
     ]
     crossed = [
         label
-        for label, box in extents(diagram)
+        for label, box in extents(diagram, texts)
         if any(line.intersects_bbox(box.padded(0.01), filled=False) for line in lines)
     ]
     assert crossed == []
 
 
 @each_diagram
-def test_every_text_and_line_lies_on_the_page(diagram):
+def test_every_text_and_line_lies_on_the_page(diagram, extents):
     page = np.array([(0, 0), diagram.get_size_inches()])
-    corners = [corner for _, box in extents(diagram) for corner in box.get_points()]
+    corners = [corner for _, box in extents(diagram, texts) for corner in box.get_points()]
     corners += [vertex for axes in diagram.axes for line in axes.lines for vertex in line.get_xydata()]
     assert np.all(np.array(corners) > page[0])
     assert np.all(np.array(corners) < page[1])
@@ -139,13 +121,9 @@ def test_text_is_of_print_size(diagram):
 
 
 @each_diagram
-def test_two_runs_write_the_same_bytes(name, tmp_path: Path):
+def test_two_runs_write_the_same_bytes(name, saved):
     module = figure_module(name)
-    runs = []
-    for run in ("first", "second"):
-        (tmp_path / run).mkdir()
-        style.save(module.draw({}), tmp_path / run, name, module.caption({}))
-        runs.append({path.name: path.read_bytes() for path in (tmp_path / run).iterdir()})
+    runs = [saved(module.draw({}), name, module.caption({})) for _ in range(2)]
     assert set(runs[0]) == {f"{name}.pdf", f"{name}.svg", f"{name}.png", f"{name}.txt"}
     assert runs[0] == runs[1]
 

@@ -1,0 +1,536 @@
+"""The figures of data: the right lines in the named styles, honest captions, legible, robust against odd tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+
+from identification.files import InputError
+from paper_figures import __main__ as command_line
+from paper_figures import captions, fig_2_12, panels, style
+from paper_figures.__main__ import figure_module
+
+Tables = dict[str, pd.DataFrame]
+
+TIME_S = np.linspace(0.0, 12.0, 241)
+
+
+def pid_tables() -> Tables:
+    columns = {"time_s": TIME_S, "reference": np.full(len(TIME_S), 2.0)}
+    for k, run in enumerate(("printed_none", "printed_back_calculation", "swapped_none", "swapped_back_calculation")):
+        columns[f"output_{run}"] = 2.0 - 2.0 * np.exp(-TIME_S) * np.cos((k + 1) * TIME_S)
+        columns[f"control_{run}"] = (9.0 - k) * np.exp(-TIME_S / 2)
+        columns[f"saturated_{run}"] = np.clip(columns[f"control_{run}"], -3.0, 3.0)
+    summary = {
+        **{"step": 2.0, "back_calculation": 1.25, "limit": 3.0},
+        **{"overshoot_printed_none": 41.0, "overshoot_printed_back_calculation": 6.5},
+        **{"overshoot_swapped_none": 37.0, "overshoot_swapped_back_calculation": 1.75},
+    }
+    return {"pid": pd.DataFrame(columns), "pid_summary": pd.DataFrame([summary])}
+
+
+def additive_error_tables(tests: int = 3) -> Tables:
+    omega = np.linspace(40.0, 900.0, 60)
+    rows = [
+        pd.DataFrame({"test": test, "omega": omega, "error": test / omega, "bound": omega / 10, "plant": 5 / omega})
+        for test in range(1, tests + 1)
+    ]
+    summary = {"tests": tests, "lines": 60 * tests, "largest_ratio": 0.375, "largest_ratio_omega": 54.5}
+    return {"additive_error": pd.concat(rows, ignore_index=True), "additive_error_summary": pd.DataFrame([summary])}
+
+
+def f_gamma_tables(betas: tuple[float, ...] = (0.2, 0.05, 0.0125), chosen: float = 0.05) -> Tables:
+    gamma = np.linspace(0.0, 60.0, 61)
+    rows = [
+        pd.DataFrame({"alpha": 0.1, "beta": beta, "gamma": gamma, "f": 4 - beta + np.abs(gamma - 20 - 400 * beta) / 20})
+        for beta in betas
+    ]
+    summary = {"alpha": 0.1, "beta": chosen, "gamma": 40.0, "f": 3.95}
+    summary |= {"beta_best": 0.0721, "gamma_best": 48.84, "f_best": 3.5279}
+    return {"f_gamma": pd.concat(rows, ignore_index=True), "f_gamma_summary": pd.DataFrame([summary])}
+
+
+def tracking_tables(name: str) -> Tables:
+    columns = {"time_s": TIME_S, "reference": 5.0 * np.cos(1.5 * TIME_S)}
+    rows = []
+    for k, run in enumerate(("none", "thesis", "corrected", "none_pade", "thesis_pade")):
+        columns[f"error_{run}"] = (5.0 - k) * np.exp(-TIME_S) + (2.5 if run.startswith("thesis") else 0.0)
+        columns[f"output_{run}"] = columns["reference"] - columns[f"error_{run}"]
+        columns[f"control_{run}"] = (12.0 + 10 * k) * np.exp(-TIME_S) * np.cos(9 * TIME_S)
+        columns[f"saturated_{run}"] = np.clip(columns[f"control_{run}"], -6.5, 6.5)
+        rows.append(
+            {
+                **{"run": run, "limit": 6.5, "required": 7.25, "last_saturation_s": 3.125 + k},
+                **{"settling_s": 4.5 + k, "offset": -2.5 - k, "ripple": 0.625 + k},
+                **{"peak_error_after_1s": 1.375 + k, "relative_error_percent": 62.5 + k},
+            }
+        )
+    return {name: pd.DataFrame(columns), f"{name}_summary": pd.DataFrame(rows)}
+
+
+TABLES = {
+    "pid": pid_tables,
+    "additive_error": additive_error_tables,
+    "f_gamma": f_gamma_tables,
+    "delay_free": lambda: tracking_tables("delay_free"),
+    "extended": lambda: tracking_tables("extended"),
+}
+
+# For every panel over time, in the order of the letters: column -> entry of style.LINES.
+RUN = {"none": "without anti-windup", "thesis": "thesis anti-windup", "corrected": "corrected anti-windup"}
+WITHOUT, WITH = RUN["none"], RUN["thesis"]
+
+
+def pid_panels(kind: str, line: str) -> list[dict[str, str]]:
+    return [
+        panel
+        for gains in ("swapped", "printed")
+        for panel in ({"reference": "reference", f"output_{gains}_{kind}": line}, {f"control_{gains}_{kind}": line})
+    ]
+
+
+def signals(signal: str, *runs: str) -> dict[str, str]:
+    return {f"{signal}_{run}": RUN[run] for run in runs}
+
+
+REFERENCE = {"reference": "reference"}
+PANELS = {
+    "fig_2_02": pid_panels("none", WITHOUT),
+    "fig_2_03": pid_panels("back_calculation", WITH),
+    "fig_2_04": [
+        REFERENCE | {f"output_{gains}_none": WITHOUT, f"output_{gains}_back_calculation": WITH}
+        for gains in ("swapped", "printed")
+    ],
+    "fig_2_12": [
+        REFERENCE | signals("output", "thesis", "corrected"),
+        signals("error", "thesis", "corrected"),
+    ],
+    "fig_2_13": [signals("control", "thesis"), signals("control", "corrected")],
+    "fig_2_14": [REFERENCE | signals("output", "none"), signals("error", "none")],
+    "fig_4_01": [REFERENCE | signals("output", "none"), signals("error", "none"), {}],
+    "fig_4_02": [signals("control", "none"), signals("saturated", "none")],
+    "fig_4_03": [
+        *(REFERENCE | signals("output", "thesis"), signals("error", "thesis")),
+        *(REFERENCE | signals("output", "corrected"), signals("error", "corrected"), {}),
+    ],
+    "fig_4_04": [
+        signals(signal, run) for run in ("thesis", "corrected") for signal in ("control", "saturated", "control")
+    ],
+}
+NAMES = [*PANELS, "fig_2_09", "fig_2_10", "fig_2_11"]
+CONTROL_PANELS = [
+    *(("fig_2_02", 1, "swapped_none"), ("fig_2_03", 3, "printed_back_calculation")),
+    *(("fig_2_13", 0, "thesis"), ("fig_2_13", 1, "corrected"), ("fig_4_04", 2, "thesis"), ("fig_4_04", 5, "corrected")),
+]
+
+each_figure = pytest.mark.parametrize("name", NAMES)
+
+
+def tables_of(name: str) -> Tables:
+    return TABLES[figure_module(name).TABLES[0]]()
+
+
+def lettered(figure: Figure) -> list[Axes]:
+    """The panels in the order of their letters."""
+    return sorted(figure.axes, key=lambda panel: panel.texts[0].get_text())
+
+
+def look(line: Line2D) -> tuple[object, ...]:
+    return line.get_color(), line.get_linewidth(), line.is_dashed()
+
+
+def lines_of(panel: Axes, values: pd.Series) -> list[Line2D]:
+    return [
+        line
+        for line in panel.lines
+        if len(line.get_ydata()) == len(values) and np.array_equal(line.get_ydata(), values)
+    ]
+
+
+def texts(figure: Figure) -> list[Text]:
+    """All that is written: letters, keys, names of axes, and the numbers on them."""
+    written: list[Text] = []
+    for panel in figure.axes:
+        legend = panel.get_legend()
+        written += [*panel.texts, panel.xaxis.label, panel.yaxis.label, *(legend.get_texts() if legend else [])]
+        for axis, (low, high) in ((panel.xaxis, panel.get_xlim()), (panel.yaxis, panel.get_ylim())):
+            written += [
+                tick.label1
+                for tick in [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+                if tick.label1.get_visible() and low <= tick.get_loc() <= high
+            ]
+    return written
+
+
+@pytest.mark.parametrize(("name", "letter"), [(name, k) for name, panels in PANELS.items() for k in range(len(panels))])
+def test_panel_shows_its_signals_in_the_named_styles(name, letter):
+    tables = tables_of(name)
+    table = tables[figure_module(name).TABLES[0]]
+    panel = lettered(figure_module(name).draw(tables))[letter]
+    for column, kind in PANELS[name][letter].items():
+        assert [look(line) for line in lines_of(panel, table[column])] == [look(Line2D([], [], **style.LINES[kind]))]
+    for line in panel.lines[: len(PANELS[name][letter])]:
+        np.testing.assert_array_equal(line.get_xdata(), table["time_s"])
+
+
+@pytest.mark.parametrize("name", PANELS)
+def test_panels_show_the_whole_run_but_for_the_enlarged_ones(name):
+    enlarged = {"fig_4_03": {4: 1.15 * 4.125}, "fig_4_04": {2: 1.15 * 5.125, 5: 1.15 * 5.125}}.get(name, {})
+    for k, panel in enumerate(lettered(figure_module(name).draw(tables_of(name)))):
+        assert panel.get_xlim() == pytest.approx((0.0, enlarged.get(k, TIME_S[-1])))
+
+
+@pytest.mark.parametrize("name", PANELS)
+def test_panels_are_lettered_and_no_panel_is_left_over(name):
+    letters = [panel.texts[0].get_text() for panel in lettered(figure_module(name).draw(tables_of(name)))]
+    assert letters == [f"({letter})" for letter in "abcdef"[: len(PANELS[name])]]
+
+
+@pytest.mark.parametrize(("name", "letter", "run"), CONTROL_PANELS)
+def test_saturated_input_is_a_pale_band_below_the_control(name, letter, run):
+    tables = tables_of(name)
+    table = tables[figure_module(name).TABLES[0]]
+    panel = lettered(figure_module(name).draw(tables))[letter]
+    (control,), (saturated,) = (lines_of(panel, table[f"{signal}_{run}"]) for signal in ("control", "saturated"))
+    assert saturated.get_linewidth() > 2 * control.get_linewidth()
+    assert saturated.get_zorder() < control.get_zorder()
+    assert saturated.get_color() == panels.paler(control.get_color(), 0.6)
+
+
+@pytest.mark.parametrize("name", ["fig_2_02", "fig_2_03", "fig_2_13", "fig_4_02", "fig_4_04"])
+def test_limits_of_the_tables_are_dotted(name):
+    tables = tables_of(name)
+    summary = tables[figure_module(name).TABLES[1]]
+    summary["limit"] = 2.75
+    dotted = look(Line2D([], [], **style.LINES["saturation limits"]))
+    found = [
+        {line.get_ydata()[0] for line in panel.lines if len(line.get_ydata()) == 2 and look(line) == dotted}
+        for panel in lettered(figure_module(name).draw(tables))
+    ]
+    assert found == [{-2.75, 2.75} if "reference" not in signals else set() for signals in PANELS[name]]
+
+
+@pytest.mark.parametrize(("name", "letter", "run"), [("fig_4_01", 2, "none"), ("fig_4_03", 4, "thesis")])
+def test_pade_panel_shows_the_difference(name, letter, run):
+    tables = tables_of(name)
+    difference = tables["extended"][f"output_{run}"] - tables["extended"][f"output_{run}_pade"]
+    (line,) = lettered(figure_module(name).draw(tables))[letter].lines
+    np.testing.assert_array_equal(line.get_ydata(), difference)
+    assert look(line) == look(Line2D([], [], **style.LINES["second-order Pade"]))
+    assert f"at most {difference.abs().max():.3g}" in figure_module(name).caption(tables)
+
+
+@pytest.mark.parametrize("tests", [1, 3, 9])
+def test_every_test_has_its_errors(tests):
+    tables = additive_error_tables(tests)
+    table = tables["additive_error"]
+    (panel,) = figure_module("fig_2_09").draw(tables).axes
+    *errors, plant, bound = panel.lines
+    assert len(errors) == tests
+    for number, line in enumerate(errors, start=1):
+        rows = table[table["test"] == number]
+        np.testing.assert_array_equal(line.get_xydata(), rows[["omega", "error"]])
+        assert line.get_linestyle() == "None"
+    assert len({(line.get_marker(), line.get_color()) for line in errors}) == tests
+    np.testing.assert_array_equal(bound.get_ydata(), table["bound"][:60])
+    np.testing.assert_array_equal(plant.get_ydata(), table["plant"][:60])
+    assert look(bound) == look(Line2D([], [], **style.LINES["bound"]))
+    assert (panel.get_xscale(), panel.get_yscale()) == ("log", "log")
+    assert panel.get_xlabel() == r"$\omega$ [rad/s]"
+
+
+def test_largest_errors_survive_thinning():
+    rng = np.random.default_rng(1)
+    tables = additive_error_tables(1)
+    omega = np.linspace(40.0, 900.0, 5000)
+    error = rng.uniform(0.5, 1.0, 5000)
+    error[[17, 4321]] = 7.0, 1e-4
+    tables["additive_error"] = pd.DataFrame(
+        {"test": 1, "omega": omega, "error": error, "bound": 10.0, "plant": 1.0}
+    ).sample(frac=1, random_state=2)
+    errors = figure_module("fig_2_09").draw(tables).axes[0].lines[0]
+    assert len(errors.get_xdata()) <= 500
+    drawn = [tuple(point) for point in errors.get_xydata()]
+    assert {(omega[17], 7.0), (omega[4321], 1e-4)} <= set(drawn)
+
+
+@pytest.mark.parametrize("above", [0, 2])
+def test_caption_counts_the_lines_above_the_bound(above):
+    tables = additive_error_tables()
+    tables["additive_error"].loc[: above - 1, "error"] = 1e6
+    caption = figure_module("fig_2_09").caption(tables)
+    assert ("at every line" if above == 0 else "but for 2 lines") in caption
+    assert "synthetic" in caption
+
+
+@pytest.mark.parametrize(
+    ("betas", "chosen"), [((0.05,), 0.05), ((0.2, 0.05, 0.0125), 0.05), (tuple(0.01 * k for k in range(1, 9)), 0.03)]
+)
+def test_each_beta_has_a_curve_with_its_least_value_and_the_chosen_one_leads(betas, chosen):
+    tables = f_gamma_tables(betas, chosen)
+    (panel,) = figure_module("fig_2_10").draw(tables).axes
+    assert len(panel.lines) == 2 * len(betas)
+    labels = [text.get_text() for text in panel.get_legend().get_texts()]
+    assert labels[0] == rf"$\beta = {captions.fraction(chosen)}$ s (chosen)"
+    assert sum("chosen" in label for label in labels) == 1
+    assert look(panel.lines[0]) == look(Line2D([], [], **style.LINES["family 1"]))
+    for curve, dot in zip(panel.lines[::2], panel.lines[1::2], strict=True):
+        assert dot.get_ydata() == curve.get_ydata().min()
+        assert dot.get_xdata() == curve.get_xdata()[curve.get_ydata().argmin()]
+
+
+def test_enlargement_shows_the_chosen_beta_around_its_least_value():
+    figure = figure_module("fig_2_11").draw(f_gamma_tables())
+    curve, dot = figure.axes[0].lines
+    np.testing.assert_array_equal(dot.get_xydata(), [[40.0, 3.95]])
+    np.testing.assert_array_equal(curve.get_xdata(), np.arange(28.0, 53.0))
+    assert "40" in figure.axes[0].get_legend().get_texts()[0].get_text()
+
+
+# What a caption says, and where it stands in the tables.
+SAID = {
+    "fig_2_02": ["overshoot_swapped_none", "step", "limit"],
+    "fig_2_03": ["overshoot_swapped_back_calculation", "overshoot_printed_back_calculation", "back_calculation"],
+    "fig_2_04": ["overshoot_swapped_none", "overshoot_swapped_back_calculation"],
+    "fig_2_09": ["tests", "lines", "largest_ratio", "largest_ratio_omega"],
+    "fig_2_10": ["alpha", "beta", "beta_best", "gamma_best", "f_best"],
+    "fig_2_11": ["beta", "gamma", "f", "beta_best", "gamma_best", "f_best"],
+    "fig_2_12": ["limit", "required", "offset", "ripple", "relative_error_percent"],
+    "fig_2_13": ["limit", "last_saturation_s"],
+    "fig_2_14": ["limit", "required", "last_saturation_s"],
+    "fig_4_01": ["limit", "required", "last_saturation_s", "peak_error_after_1s", "settling_s"],
+    "fig_4_02": ["limit", "last_saturation_s"],
+    "fig_4_03": ["limit", "last_saturation_s", "offset", "settling_s"],
+    "fig_4_04": ["limit", "last_saturation_s"],
+}
+
+
+@pytest.mark.parametrize(("name", "column"), [(name, column) for name, columns in SAID.items() for column in columns])
+def test_caption_says_what_the_summary_says(name, column):
+    tables = tables_of(name)
+    module = figure_module(name)
+    before = module.caption(tables)
+    summary = tables[module.TABLES[1]]
+    summary[column] = summary[column] * 1.5
+    assert module.caption(tables) != before
+
+
+@each_figure
+def test_caption_is_plain_and_names_the_figure_of_the_thesis(name):
+    caption = figure_module(name).caption(tables_of(name))
+    _, chapter, number = name.split("_")
+    assert f"thesis Fig. {chapter}.{int(number)})" in caption
+    assert caption.isascii()
+    assert "nan" not in caption
+    assert not set("{}\n") & set(caption)
+
+
+@pytest.mark.parametrize(
+    ("limit", "required", "words"),
+    [
+        (10.0, 11.0547, "2.79 % of the reference's amplitude: the text's tracking error of 0.098 % is beyond reach"),
+        (10.0, 9.0, "0 % of the reference's amplitude: the text's tracking error of 0.098 % is not ruled out"),
+        (10.0, 10.01, "the text's tracking error of 0.098 % is not ruled out"),
+    ],
+)
+def test_claimed_tracking_error_is_judged_by_what_an_integrator_can_follow(limit, required, words):
+    assert words in fig_2_12.within_reach(limit, required)
+
+
+def test_captions_follow_the_data_not_the_thesis():
+    tables = tables_of("fig_2_14")
+    assert "the control does not grow" in figure_module("fig_2_14").caption(tables)
+    tables["delay_free"]["control_none"] = np.exp(TIME_S)
+    assert "the control grows" in figure_module("fig_2_14").caption(tables)
+    tables["delay_free_summary"]["required"] = 1.0
+    assert "is within the limits" in figure_module("fig_2_14").caption(tables)
+
+
+@each_figure
+def test_summary_without_settling_or_last_saturation(name, saved):
+    tables = tables_of(name)
+    module = figure_module(name)
+    summary = tables[module.TABLES[1]]
+    for column in {"settling_s", "last_saturation_s"} & set(summary.columns):
+        summary[column] = np.nan
+    caption = module.caption(tables)
+    assert "nan" not in caption
+    if "last_saturation_s" in SAID[name]:
+        assert "is saturated at the end of the run" in caption
+    if "settling_s" in SAID[name]:
+        assert "does not settle within the run" in caption
+    saved(module.draw(tables), name, caption)
+
+
+@pytest.mark.parametrize("huge", [1e6, 1e99])
+@pytest.mark.parametrize("name", PANELS)
+def test_divergent_signals_leave_the_panel_and_the_reference_stays_legible(name, huge, saved):
+    tables = tables_of(name)
+    module = figure_module(name)
+    table = tables[module.TABLES[0]]
+    for column in table.columns.drop(["time_s", "reference"]):
+        if not column.startswith("saturated"):
+            table[column] *= huge ** (TIME_S / TIME_S[-1])
+    figure = module.draw(tables)
+    for panel in figure.axes:
+        assert np.ptp(panel.get_ylim()) < 500
+    saved(figure, name, module.caption(tables))
+
+
+@each_figure
+def test_drawing_leaves_the_tables_as_they_are(name):
+    tables = tables_of(name)
+    module = figure_module(name)
+    module.draw(tables)
+    module.caption(tables)
+    for table, before in tables_of(name).items():
+        pd.testing.assert_frame_equal(tables[table], before)
+
+
+@each_figure
+def test_no_text_overlaps_another_and_all_is_on_the_page(name, extents):
+    figure = figure_module(name).draw(tables_of(name))
+    boxes = extents(figure, texts)
+    assert len(boxes) > 5
+    assert [(one, two) for (one, a), (two, b) in combinations(boxes, 2) if a.padded(-0.005).overlaps(b)] == []
+    width, height = figure.get_size_inches()
+    outside = [text for text, box in boxes if box.x0 < 0 or box.y0 < 0 or box.x1 > width or box.y1 > height]
+    assert outside == []
+
+
+@each_figure
+def test_keys_stand_clear_of_the_data(name, extents):
+    figure = figure_module(name).draw(tables_of(name))
+    extents(figure, texts)
+    for panel in figure.axes:
+        assert panel.get_legend().get_window_extent().y0 >= panel.get_window_extent().y1
+
+
+@each_figure
+def test_text_is_of_print_size_and_no_panel_has_a_title(name):
+    figure = figure_module(name).draw(tables_of(name))
+    assert {text.get_fontsize() for text in texts(figure)} <= {8, 9}
+    assert {panel.get_title() for panel in figure.axes} == {""}
+    assert figure.get_size_inches()[0] in (style.COLUMN_WIDTH, style.FULL_WIDTH)
+
+
+@pytest.mark.parametrize("name", PANELS)
+def test_lowest_panels_name_the_time(name):
+    figure = figure_module(name).draw(tables_of(name))
+    bottom = min(panel.get_position().y0 for panel in figure.axes)
+    for panel in figure.axes:
+        assert panel.get_xlabel() in ("", "Time $t$ [s]")
+        assert panel.get_xlabel() or panel.get_position().y0 > bottom
+
+
+@each_figure
+def test_two_runs_write_the_same_bytes(name, saved):
+    module = figure_module(name)
+    runs = [saved(module.draw(tables_of(name)), name, module.caption(tables_of(name))) for _ in range(2)]
+    assert set(runs[0]) == {f"{name}.pdf", f"{name}.svg", f"{name}.png", f"{name}.txt"}
+    assert runs[0] == runs[1]
+
+
+@pytest.mark.parametrize("count", [10, 3000, 3001, 50000])
+def test_envelope_keeps_ends_and_peaks(count):
+    x = np.linspace(0.0, 3.0, count)
+    y = np.sin(400 * x)
+    y[[count // 3, count // 2]] = 9.0, -9.0
+    thin_x, thin_y = panels.envelope(x, y)
+    assert len(thin_x) <= max(3000, min(count, 3000))
+    assert np.all(np.diff(thin_x) > 0)
+    assert {(x[0], y[0]), (x[-1], y[-1]), (x[count // 3], 9.0), (x[count // 2], -9.0)} <= set(
+        zip(thin_x, thin_y, strict=True)
+    )
+
+
+def test_long_lines_are_thinned_in_the_figure():
+    time_s = np.linspace(0.0, 12.0, 20001)
+    tables = tables_of("fig_2_14")
+    short = tables["delay_free"]
+    tables["delay_free"] = pd.DataFrame({column: np.interp(time_s, TIME_S, short[column]) for column in short})
+    tables["delay_free"]["time_s"] = time_s
+    tables["delay_free"].loc[777, "error_none"] = 40.0
+    error = lettered(figure_module("fig_2_14").draw(tables))[1].lines[0]
+    assert len(error.get_ydata()) <= panels.MOST_POINTS
+    assert error.get_ydata().max() == 40.0
+
+
+@pytest.mark.parametrize(
+    ("values", "scale", "low", "high"),
+    [
+        ([-1.0, 3.0], 1.0, -1.24, 3.24),
+        ([-1.0, 99.0], 1.0, -7.0, 105.0),
+        ([-1.0, 1e9], 1.0, -1.66, 10.66),
+        ([-1e9, np.inf, 1e9], 2.0, -22.4, 22.4),
+        ([0.0, 0.0], 0.0, -1.0, 1.0),
+        ([-4.0, -4.0], 4.0, -8.0, 0.0),
+        ([np.nan], 1.0, -1.0, 1.0),
+    ],
+)
+def test_view_shows_all_but_divergence(values, scale, low, high):
+    assert panels.view([np.array(values)], scale) == pytest.approx((low, high))
+
+
+@pytest.mark.parametrize(
+    ("value", "words"), [(0.025, "1/40"), (1 / 3, "1/3"), (0.0328, "0.0328"), (2.0, "2"), (-0.5, "-0.5")]
+)
+def test_fractions_are_written_where_they_are_exact(value, words):
+    assert captions.fraction(value) == words
+
+
+def drawn(tmp_path, name: str, tables: Mapping[str, pd.DataFrame]):
+    for table, rows in tables.items():
+        rows.to_csv(tmp_path / f"{table}.csv", index=False)
+    return CliRunner().invoke(command_line.main, ["draw", name, "--results", str(tmp_path), "--output", str(tmp_path)])
+
+
+MISSING = [
+    *(("fig_2_02", "pid", "output_printed_none"), ("fig_2_03", "pid_summary", "limit"), ("fig_2_04", "pid", "time_s")),
+    *(("fig_2_09", "additive_error", "bound"), ("fig_2_09", "additive_error", "omega")),
+    *(("fig_2_10", "f_gamma", "gamma"), ("fig_2_11", "f_gamma_summary", "f_best")),
+    *(("fig_2_13", "delay_free", "saturated_corrected"), ("fig_4_01", "extended", "output_none_pade")),
+    *(("fig_4_04", "extended_summary", "last_saturation_s"), ("fig_4_03", "extended_summary", "run")),
+]
+
+
+@pytest.mark.parametrize(("name", "table", "column"), MISSING)
+def test_missing_column_is_one_sentence_with_its_file(name, table, column, tmp_path):
+    tables = tables_of(name)
+    tables[table] = tables[table].drop(columns=column)
+    result = drawn(tmp_path, name, tables)
+    assert result.exit_code == 2
+    assert result.output == f"Error: {tmp_path / table}.csv: no column {column}, which {name} needs\n"
+    assert not list(tmp_path.glob("fig_*"))
+
+
+def test_key_error_that_is_no_column_is_not_swallowed(tmp_path, monkeypatch):
+    monkeypatch.delitem(style.LINES, "reference")
+    result = drawn(tmp_path, "fig_2_14", tables_of("fig_2_14"))
+    assert isinstance(result.exception, KeyError)
+
+
+def test_table_without_rows_is_refused(tmp_path):
+    tables = tables_of("fig_2_14")
+    result = drawn(tmp_path, "fig_2_14", tables | {"delay_free": tables["delay_free"].iloc[:0]})
+    assert result.exit_code == 2
+    assert result.output.startswith(f"Error: {tmp_path / 'delay_free'}.csv: no rows")
+
+
+def test_summary_without_a_run_is_refused(tmp_path):
+    tables = tables_of("fig_4_01")
+    summary = tables["extended_summary"]
+    result = drawn(tmp_path, "fig_4_01", tables | {"extended_summary": summary[summary["run"] != "none"]})
+    assert result.exit_code == 2
+    assert "no row whose run is none" in result.output
+    with pytest.raises(InputError, match="whose run is other"):
+        captions.of_run(summary, "other", "limit")

@@ -1,0 +1,81 @@
+"""The data of every figure, for the set ``implied`` and the shipped sweeps, is what it was last time."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pandas as pd
+import pytest
+from pytest_regressions.file_regression import FileRegressionFixture
+from strict import Strict
+
+from design.contract import Design
+from experiments.additive_error import additive_error_tables
+from experiments.delay_free import delay_free_tables
+from experiments.extended import extended_tables
+from experiments.f_gamma import f_gamma_tables
+from experiments.pid import pid_tables
+from identification.frequency_response import read_sweep
+from identification.model import read_model
+from identification.thesis import DATA
+from paper_figures.__main__ import figure_module, figure_names
+
+EXPERIMENTS = ("pid", "additive_error", "f_gamma", "delay_free", "extended")
+MOST_ROWS = 120
+
+
+@cache
+def sweeps() -> tuple[object, ...]:
+    return tuple(read_sweep(path) for path in sorted((DATA / "elevation").glob("*_frf.csv")))
+
+
+@pytest.fixture(scope="module")
+def tables(extended_design: Design, delay_free_design: Design) -> dict[str, pd.DataFrame]:
+    implied = read_model("implied")
+    return (
+        pid_tables()
+        | additive_error_tables(implied, sweeps())  # type: ignore[arg-type]
+        | f_gamma_tables(implied.additive_bound)
+        | delay_free_tables(delay_free_design)
+        | extended_tables(extended_design)
+    )
+
+
+def columns_of(table: pd.DataFrame) -> dict[str, np.ndarray]:
+    """Numeric columns, thinned evenly; a text column names rows, and an empty cell becomes a flag beside a zero."""
+    if "run" in table:
+        wide = table.set_index("run").stack(future_stack=True)
+        table = pd.DataFrame({f"{run}.{column}": [float(value)] for (run, column), value in wide.items()})
+    kept = table.iloc[:: max(1, len(table) // MOST_ROWS)]
+    columns: dict[str, np.ndarray] = {}
+    for name in kept:
+        values = kept[name].to_numpy(dtype=float)
+        if np.isnan(values).any():
+            columns[f"{name}.is_empty"] = np.isnan(values).astype(float)
+            values = np.nan_to_num(values, nan=0.0)
+        columns[str(name)] = values
+    return columns
+
+
+@pytest.mark.parametrize("name", [f"{name}{part}" for name in EXPERIMENTS for part in ("", "_summary")])
+def test_table(name: str, tables: dict[str, pd.DataFrame], strict_snapshot: Strict) -> None:
+    strict_snapshot(name, columns_of(tables[name]))
+
+
+@pytest.mark.parametrize("name", figure_names())
+def test_every_figure_draws_from_tables_that_are_kept(name: str, tables: dict[str, pd.DataFrame]) -> None:
+    assert set(figure_module(name).TABLES) <= set(tables)
+
+
+@pytest.mark.parametrize("name", [name for name in figure_names() if not figure_module(name).TABLES])
+def test_diagram(name: str, file_regression: FileRegressionFixture) -> None:
+    """Every text of a block diagram with its place, in inches."""
+    figure = figure_module(name).draw({})
+    lines = []
+    for axes in figure.axes:
+        for text in axes.texts:
+            x, y = text.get_position()
+            lines.append(f"{text.get_text()}\t{x:.3f}\t{y:.3f}")
+    assert lines
+    file_regression.check("\n".join(sorted(lines)) + "\n", basename=name, extension=".txt")
