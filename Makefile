@@ -52,7 +52,7 @@ test: lint ## check style, types and everything else
 	$(PY) -m pytest -q -n 2 --dist loadfile
 
 bench: $(READY) ## measure speed as ratios against peers
-	$(PY) -m pytest -q benchmarks --benchmark-only --benchmark-columns=median,iqr,rounds
+	$(PY) -m pytest -q -s benchmarks --benchmark-only --benchmark-columns=median,iqr,rounds
 
 lint: $(READY) ## check style and types
 	.venv/bin/ruff check --quiet .
