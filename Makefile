@@ -71,6 +71,9 @@ $(READY): requirements.lock pyproject.toml
 
 # Remember what was asked for, so that another MODEL or other SWEEPS rebuild what depends on them.
 ifneq (,$(filter figures $(BUILD)/%,$(MAKECMDGOALS)))
+MISSING := $(filter-out $(FITTED) $(wildcard $(SWEEPS) $(MODEL_FILE)),$(SWEEPS) $(MODEL_FILE))
+$(if $(MISSING),$(error $(MISSING): no such file; expected sweep files in SWEEPS, or table, implied or a model.json in MODEL))
+$(if $(SWEEPS),,$(error SWEEPS is empty; expected one or more sweep files))
 $(shell mkdir -p $(RESULTS) $(FIGURES); printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' | cmp -s - $(CHOICE) || \
 	printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' > $(CHOICE))
 endif

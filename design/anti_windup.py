@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -166,6 +167,25 @@ def describe(model: IdentifiedModel, anti_windup: AntiWindup) -> Judgement:
         theta2_stable=anti_windup.theta2(model.plant).is_stable,
         theta1_tilde_at_zero=float(anti_windup.theta1_tilde(0j).real),
     )
+
+
+def compensators(model: IdentifiedModel, rate: float) -> dict[str, dict[str, Any]]:
+    """The ``anti_windup`` member of design.json: parameters and judgement of both compensators.
+
+    Parameters
+    ----------
+    model
+        Plant and W_a.
+    rate
+        Of the corrected compensator in 1/s, see :func:`washout`.
+    """
+    alpha, beta, gamma = thesis_choice(model.additive_bound)
+    thesis = describe(model, second_order(alpha, beta, gamma))
+    corrected = describe(model, washout(model.additive_bound, rate))
+    return {
+        "thesis": {"alpha": alpha, "beta": beta, "gamma": gamma} | asdict(thesis),
+        "corrected": {"rate": rate} | asdict(corrected),
+    }
 
 
 def beta_grid(alpha: float) -> tuple[float, ...]:

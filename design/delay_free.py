@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 
 import numpy as np
 
-from design.anti_windup import describe, second_order, thesis_choice, washout
+from design.anti_windup import compensators, second_order
 from design.block import Block, bound_block, plant_denominator, plant_numerator
 from design.contract import Design
 from design.internal_model import internal_model, reference_polynomial
@@ -49,6 +48,9 @@ def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -
     W1 has the reference's poles, damped: moved left by twice the decay rate, which makes the stabiliser's
     zeros there cancel, and W1(0) = 1/TRACKING. The decay rate leaves SETTLED of a transient after one period,
     or is half that of the slowest mode of plant and bound where these decay more slowly.
+
+    C = K A/Lambda has a zero at the plant's pole s = 0 (A(0) = 0; Lemma 1 assumes a stable A): the integrator is
+    hidden from the loop and not stabilised, so that a constant disturbance at the plant's input makes y drift.
     """
     if not (math.isfinite(period_s) and period_s > 0):
         raise InputError(f"the period is {period_s:g} s; expected a positive number")
@@ -72,10 +74,8 @@ def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -
     W1 = Block(float(np.prod(np.abs(damped))) / TRACKING, (), damped)
     synthesis = mixed_sensitivity(units.G_A, W1, W2, decay_rate)
 
-    alpha, beta, gamma = thesis_choice(model.additive_bound)
-    thesis = second_order(alpha, beta, gamma)
-    rate = 2 * decay_rate
-    corrected = washout(model.additive_bound, rate)
+    anti_windup = compensators(model, rate=2 * decay_rate)
+    thesis = second_order(*(anti_windup["thesis"][key] for key in ("alpha", "beta", "gamma")))
     return Design(
         kind="delay-free",
         plant=model.plant,
@@ -100,10 +100,7 @@ def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -
             "W1": W1,
             "W2": W2,
         },
-        anti_windup={
-            "thesis": {"alpha": alpha, "beta": beta, "gamma": gamma} | asdict(describe(model, thesis)),
-            "corrected": {"rate": rate} | asdict(describe(model, corrected)),
-        },
+        anti_windup=anti_windup,
         parameters={"period_s": period_s, "epsilon": epsilon},
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from design.anti_windup import describe, second_order, thesis_choice, washout
+from design.anti_windup import compensators, second_order
 from design.block import Block, plant_block
 from design.contract import Design
 from design.smith_predictor import free_part, stabiliser
@@ -60,9 +60,8 @@ def design_extended(
     K_0, K_1, K = stabiliser(model.plant, free.T_so)
     F1 = plant_block(model.plant)
     F2 = (K_1 * Block(1.0, (0j,)) * free.T_so).scaled(-1.0)  # W_aw/(K R_0) with W_aw = -s T_so, Eq. (3.29)
-    alpha, beta, gamma = thesis_choice(model.additive_bound)
-    thesis = second_order(alpha, beta, gamma)
-    corrected = washout(model.additive_bound, rate=a)
+    anti_windup = compensators(model, rate=a)
+    thesis = second_order(*(anti_windup["thesis"][key] for key in ("alpha", "beta", "gamma")))
     return Design(
         kind="extended",
         plant=model.plant,
@@ -82,9 +81,6 @@ def design_extended(
             "theta2": thesis.theta2(model.plant),
         },
         hinf=None,
-        anti_windup={
-            "thesis": {"alpha": alpha, "beta": beta, "gamma": gamma} | asdict(describe(model, thesis)),
-            "corrected": {"rate": a} | asdict(describe(model, corrected)),
-        },
+        anti_windup=anti_windup,
         parameters={"a": a, "e": e, "f": f, "method": method, "Q": tried},
     )
