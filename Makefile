@@ -123,7 +123,7 @@ $(eval $(call feeds,extended,fig_4_01 fig_4_02 fig_4_03 fig_4_04))
 
 $(call drawing,fig_2_02 fig_2_03 fig_2_04): $(addprefix paper_figures/,pid.py panels.py captions.py)
 $(call drawing,fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14): $(addprefix paper_figures/,panels.py captions.py)
-$(call drawing,fig_2_11): paper_figures/fig_2_10.py
+$(call drawing,fig_2_10 fig_2_11): paper_figures/f_gamma.py
 $(call drawing,fig_4_01 fig_4_02 fig_4_03 fig_4_04): $(addprefix paper_figures/,extended.py panels.py captions.py)
 
 DIAGRAMS := fig_2_01 fig_2_05 fig_2_06 fig_2_07 fig_2_08 fig_3_01 fig_3_02

@@ -20,7 +20,7 @@ def design_extended(
 ) -> Design:
     """Chapters 3 and 4: Q, C_0, T_so, F1, F2, K_0, K_1, K, theta1~ and theta2.
 
-    What holds 1 + F = 1 - T_so exp(-T_d s) is no block: C_aw, G_A and theta1 of (3.30), see
+    What holds 1 + F = 1 - T_so exp(-T_d s) is no block: C_aw, G_A and theta1 are functions of
     :mod:`design.smith_predictor`.
 
     Parameters

@@ -85,6 +85,12 @@ def anti_windup_controller(plant: PlantModel, K: Block, T_so: Block, s: ArrayLik
     return np.asarray(K(s) / (1 - T_so(s) * np.exp(-plant.delay_s * s)))
 
 
+def anti_windup_theta1(theta1_tilde: Block, plant: PlantModel, T_so: Block, s: ArrayLike) -> Complex:
+    """theta1 = theta1~ (1 + F) with F = -T_so exp(-T_d s), Thesis Eq. (3.30), at ``s`` (rad/s)."""
+    s = np.asarray(s, dtype=complex)
+    return np.asarray(theta1_tilde(s) * (1 - T_so(s) * np.exp(-plant.delay_s * s)))
+
+
 def augmented_plant(plant: PlantModel, T_so: Block, s: ArrayLike) -> Complex:
     """G_A = P/(1 + F) with F = -T_so exp(-T_d s), Thesis section 3.3, at ``s`` (rad/s)."""
     s = np.asarray(s, dtype=complex)

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from paper_figures import panels, style
 from paper_figures.captions import fraction, number, only
+from paper_figures.f_gamma import curves, lowest
 from paper_figures.style import COLUMN_WIDTH, LINES, styled
 
 TABLES: tuple[str, ...] = ("f_gamma", "f_gamma_summary")
@@ -57,18 +58,3 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     panel.set_ylim(0, 1.25 * max(starts))
     panel.legend(**panels.ABOVE, ncols=2)
     return figure
-
-
-def curves(tables: Mapping[str, pd.DataFrame]) -> list[tuple[float, pd.DataFrame]]:
-    """Return each beta with its rows in the order of gamma, the chosen beta first and the others ascending."""
-    table, chosen = tables["f_gamma"], only(tables["f_gamma_summary"], "beta")
-    betas = sorted(table["beta"].unique())
-    nearest = min(betas, key=lambda beta: abs(beta - chosen))
-    betas.sort(key=lambda beta: (beta != nearest, beta))
-    return [(beta, table[table["beta"] == beta].sort_values("gamma", ignore_index=True)) for beta in betas]
-
-
-def lowest(curve: pd.DataFrame) -> tuple[float, float]:
-    """Return gamma and f where f is least."""
-    row = curve.iloc[int(curve["f"].to_numpy().argmin())]
-    return float(row["gamma"]), float(row["f"])

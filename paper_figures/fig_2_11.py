@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from paper_figures import style
 from paper_figures.captions import fraction, number, only
-from paper_figures.fig_2_10 import curves, lowest
+from paper_figures.f_gamma import curves, lowest
 from paper_figures.panels import ABOVE
 from paper_figures.style import COLUMN_WIDTH, LINES, styled
 

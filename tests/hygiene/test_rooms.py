@@ -61,6 +61,25 @@ def test_no_number_of_the_plant_in_the_code(path: Path) -> None:
             assert node.value not in PLANT, f"{path.name}, line {node.lineno}: {node.value}"
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "paper_figures").glob("fig_*.py")), ids=lambda path: path.name)
+def test_no_figure_imports_another(path: Path) -> None:
+    """So that touching one figure's module redraws that figure alone; and the Makefile knows what it does import."""
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    shared = set(re.findall(r"from paper_figures\.(\w+) import", path.read_text(encoding="utf-8")))
+    shared |= set(
+        re.findall(r"(\w+)", " ".join(re.findall(r"from paper_figures import (.*)", path.read_text("utf-8"))))
+    )
+    assert not any(name.startswith("fig_") for name in shared)
+    named = {
+        module
+        for names, modules in re.findall(r"\$\(call drawing,([^)]*)\): (.*)", makefile)
+        if path.stem in names.split()
+        or ("DIAGRAMS" in names and path.stem in makefile.split("DIAGRAMS := ")[1].split("\n")[0])
+        for module in re.findall(r"(\w+)\.py", modules)
+    }
+    assert shared - {"style"} <= named
+
+
 def test_makefile_knows_every_figures_tables() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     feeds: dict[str, set[str]] = {}

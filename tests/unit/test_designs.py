@@ -12,7 +12,13 @@ from design.contract import Design, read_design
 from design.delay_free import controller, design_delay_free
 from design.extended import METHODS, design_extended
 from design.internal_model import internal_model
-from design.smith_predictor import anti_windup_controller, augmented_plant, bezout, smith_controller
+from design.smith_predictor import (
+    anti_windup_controller,
+    anti_windup_theta1,
+    augmented_plant,
+    bezout,
+    smith_controller,
+)
 from design.stable_interpolation import StableFunction, by_poles, by_zeros, conditions, lagrange
 from identification.files import InputError
 from identification.model import IdentifiedModel
@@ -147,7 +153,10 @@ def test_extended_blocks_follow_from_each_other(extended_design: Design) -> None
     np.testing.assert_allclose(blocks["theta2"](S), plant(S) * (1 + blocks["theta1_tilde"](S)), rtol=1e-9)
     C_s = smith_controller(plant, blocks["C0"], S)
     np.testing.assert_allclose(blocks["F2"](S), -C_s / (1 + plant(S) * C_s), rtol=1e-6)  # (3.23)
+    theta1 = anti_windup_theta1(blocks["theta1_tilde"], plant, blocks["T_so"], S)
+    np.testing.assert_allclose(theta1, blocks["theta1_tilde"](S) * (1 + blocks["F"](S)), rtol=1e-9)  # (3.30)
     G_A = augmented_plant(plant, blocks["T_so"], S)
+    np.testing.assert_allclose(G_A, blocks["theta2"](S) / (1 + blocks["F"](S) + theta1), rtol=1e-9)  # (2.9)
     np.testing.assert_allclose(G_A, plant(S) / (1 + blocks["F"](S)), rtol=1e-9)
 
 
