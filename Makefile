@@ -11,6 +11,7 @@ BUILD ?= build
 MODEL ?=
 SWEEPS ?= $(sort $(wildcard data/elevation/*_frf.csv))
 OUT ?= build/refit
+LIMIT ?=
 
 PY := .venv/bin/python
 READY := .venv/.ready
@@ -23,6 +24,8 @@ FITTED := $(BUILD)/model.json
 CHOSEN := $(if $(MODEL),$(MODEL),$(FITTED))
 CHOICE := $(BUILD)/choice.txt
 MODEL_FILE := $(filter-out table implied,$(CHOSEN))
+
+LIMITS := $(if $(LIMIT),--limit $(LIMIT))
 
 NAMES := $(sort $(basename $(notdir $(wildcard paper_figures/fig_*.py))))
 DATA_NAMES := fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14 fig_4_01 fig_4_02 fig_4_03 fig_4_04
@@ -39,6 +42,7 @@ help: ## say what there is
 	@echo
 	@echo 'make figures MODEL=implied    redraw for the thesis'"'"'s own set (or table, or a model.json)'
 	@echo 'make refit SWEEPS="a.csv b.csv" OUT=mine    from your own sweep files to the figures of your plant'
+	@echo 'make refit ... LIMIT=5    under other saturation limits than the thesis'"'"'s'
 
 figures: $(foreach format,$(FORMATS),$(NAMES:%=$(FIGURES)/%.$(format))) ## draw every figure of the thesis into build/figures
 
@@ -74,8 +78,8 @@ ifneq (,$(filter figures $(BUILD)/%,$(MAKECMDGOALS)))
 MISSING := $(filter-out $(FITTED) $(wildcard $(SWEEPS) $(MODEL_FILE)),$(SWEEPS) $(MODEL_FILE))
 $(if $(MISSING),$(error $(MISSING): no such file; expected sweep files in SWEEPS, or table, implied or a model.json in MODEL))
 $(if $(SWEEPS),,$(error SWEEPS is empty; expected one or more sweep files))
-$(shell mkdir -p $(RESULTS) $(FIGURES); printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' | cmp -s - $(CHOICE) || \
-	printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' > $(CHOICE))
+$(shell mkdir -p $(RESULTS) $(FIGURES); printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' '$(LIMIT)' | cmp -s - $(CHOICE) || \
+	printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' '$(LIMIT)' > $(CHOICE))
 endif
 
 $(FITTED): $(SWEEPS) $(wildcard identification/*.py) $(if $(MODEL),,$(CHOICE)) | $(READY)
@@ -100,11 +104,11 @@ $(RESULTS)/f_gamma.csv $(RESULTS)/f_gamma_summary.csv &: $(BUILD)/design_extende
 
 $(RESULTS)/delay_free.csv $(RESULTS)/delay_free_summary.csv &: \
 		$(BUILD)/design_delay_free.json experiments/delay_free.py $(TRACKING) | $(READY)
-	$(PY) -m experiments delay-free $< --output $(RESULTS)
+	$(PY) -m experiments delay-free $< $(LIMITS) --output $(RESULTS)
 
 $(RESULTS)/extended.csv $(RESULTS)/extended_summary.csv &: \
 		$(BUILD)/design_extended.json experiments/extended.py $(TRACKING) | $(READY)
-	$(PY) -m experiments extended $< --output $(RESULTS)
+	$(PY) -m experiments extended $< $(LIMITS) --output $(RESULTS)
 
 $(BUILD)/claims.csv $(BUILD)/claims.txt &: data/thesis/claims.csv $(wildcard experiments/*.py design/*.py) $(CONTRACT) | $(READY)
 	@mkdir -p $(BUILD)

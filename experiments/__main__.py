@@ -28,6 +28,7 @@ from identification.model import read_model
 OUTPUT_FOLDER = click.option(
     "--output", type=click.Path(path_type=Path, file_okay=False), required=True, help="Existing folder for the tables."
 )
+LIMIT = click.option("--limit", type=float, help="Saturation limits +-LIMIT, instead of the thesis's.")
 DESIGN = click.argument("design", type=click.Path(path_type=Path, dir_okay=False))
 
 
@@ -64,8 +65,7 @@ def simulate_command(
     output: Path,
 ) -> None:
     """Run DESIGN from rest: time_s, reference, output, error, control, saturated_control."""
-    if not limit > 0:
-        raise InputError(f"--limit is {limit:g}; expected a positive number")
+    _positive(limit)
     if not (np.isfinite([until, sample_time]).all() and 0 < sample_time <= until):
         raise InputError(
             f"--until is {until:g} and --sample-time {sample_time:g}; expected 0 < sample time <= until, both finite"
@@ -127,18 +127,20 @@ def f_gamma(design: Path, output: Path) -> None:
 
 @main.command("delay-free")
 @DESIGN
+@LIMIT
 @OUTPUT_FOLDER
-def delay_free(design: Path, output: Path) -> None:
+def delay_free(design: Path, limit: float | None, output: Path) -> None:
     """The chapter 2 loop: delay_free.csv, delay_free_summary.csv."""
-    _write(output, delay_free_tables(_of_kind(design, "delay-free")))
+    _write(output, delay_free_tables(_of_kind(design, "delay-free"), _positive(limit)))
 
 
 @main.command("extended")
 @DESIGN
+@LIMIT
 @OUTPUT_FOLDER
-def extended(design: Path, output: Path) -> None:
+def extended(design: Path, limit: float | None, output: Path) -> None:
     """The chapter 4 loop: extended.csv, extended_summary.csv."""
-    _write(output, extended_tables(_of_kind(design, "extended")))
+    _write(output, extended_tables(_of_kind(design, "extended"), _positive(limit)))
 
 
 @main.command("additive-error")
@@ -161,6 +163,12 @@ def claims(output: Path) -> None:
         click.echo(f"  {verdict:17s}{count:4d}")
     for row in table[table["verdict"] != table["status"]].itertuples():
         click.echo(f"  {row.id}: the ledger says {row.status}, recomputed it {row.verdict}")
+
+
+def _positive(limit: float | None) -> float | None:
+    if limit is not None and not limit > 0:
+        raise InputError(f"--limit is {limit:g}; expected a positive number")
+    return limit
 
 
 def _of_kind(path: Path, kind: str) -> Design:

@@ -66,7 +66,11 @@ class Run:
 
 
 class DivergenceError(InputError):
-    """A signal of the loop passed 1e100."""
+    """A signal of the loop passed 1e100, at ``time_s`` seconds."""
+
+    def __init__(self, time_s: float) -> None:
+        super().__init__(f"the loop diverges: a signal passed 1e100 at t = {time_s:.6g} s")
+        self.time_s = time_s
 
 
 def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarray) -> Run:
@@ -92,19 +96,20 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
     -----
     Dead times are exact and events are located on the polynomials, see :mod:`experiments.taylor`. The step is
     set by the fastest eigenvalue of the loop, saturated or not, and by the shortest dead time; it is halved
-    until the last term of every series is below 1e-11 of its state.
+    until the last term of every series is below 1e-11 of the largest value of its state.
     """
     low, high = limits
     if not low < high:
         raise InputError(f"the saturation limits are {low:g} and {high:g}; expected the lower one first")
-    if len(time_s) == 0 or time_s[0] < 0 or np.any(np.diff(time_s) <= 0) or not np.all(np.isfinite(time_s)):
-        raise InputError("the sample times are not increasing finite numbers from zero on")
+    increasing = len(time_s) > 0 and time_s[0] >= 0 and time_s[-1] > 0 and np.all(np.diff(time_s) > 0)
+    if not (increasing and np.all(np.isfinite(time_s))):
+        raise InputError("the sample times are not increasing finite numbers from zero on that end after zero")
     loop = _without_zero_delays(loop)
     A = csr_array(loop.A)
     fastest = max(np.abs(np.linalg.eigvals(matrix)).max() for matrix in (loop.A, loop.A + np.outer(loop.B, loop.C)))
     horizon = float(time_s[-1])
-    # at 0.9 time constants of the fastest mode the last term of a series is just below the tolerance
-    step = min([0.9 / fastest if fastest > 0 else horizon, *loop.delays])
+    # 1.5 time constants of the fastest mode leave its last term, read REACH steps on, below the tolerance
+    step = min([1.5 / fastest if fastest > 0 else horizon, *loop.delays])
     rows = list(loop.outputs.values())
     outputs_x = np.array([x for x, _ in rows]).reshape(len(rows), len(loop.x0))
     outputs_w = np.array([w for _, w in rows]).reshape(len(rows), len(loop.delays))
@@ -137,7 +142,7 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
         else:
             break
     if status == taylor.DIVERGED:
-        raise DivergenceError(f"the loop diverges: a signal passed 1e100 at t = {end:.6g} s")
+        raise DivergenceError(end)
     if status != taylor.COMPLETE or tail > 1e-11:
         raise InputError(f"the loop could not be integrated: {len(events)} events up to t = {end:.6g} s")
     return Run(

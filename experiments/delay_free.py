@@ -14,8 +14,15 @@ PERIODS = 6  # the thesis does not print its horizon
 SAMPLES_PER_PERIOD = 4000
 
 
-def delay_free_tables(design: Design) -> dict[str, pd.DataFrame]:
-    """Run a delay-free design from rest under the limit that the thesis prints.
+def delay_free_tables(design: Design, limit: float | None = None) -> dict[str, pd.DataFrame]:
+    """Run a delay-free design from rest.
+
+    Parameters
+    ----------
+    design
+        Of kind "delay-free".
+    limit
+        Of the actuator, +-limit; the thesis's printed one unless given.
 
     Returns
     -------
@@ -23,12 +30,13 @@ def delay_free_tables(design: Design) -> dict[str, pd.DataFrame]:
         ``delay_free`` and ``delay_free_summary``, see :mod:`experiments.tracking`.
     """
     reference = thesis_reference("delay-free", design.reference_omega)
-    limit = printed()["delay_free"]["limit"]
+    limit_is_given = limit is not None
+    limit = printed()["delay_free"]["limit"] if limit is None else limit
     horizon = PERIODS * 2 * np.pi / reference.omega
     time_s = np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1)
     runs = run_all(loops(design, reference), limit, time_s)
     required = reference.amplitude / abs(complex(design.loop_plant(1j * reference.omega)))
     return {
         "delay_free": tracking_table(runs),
-        "delay_free_summary": tracking_summary(runs, limit, reference, required),
+        "delay_free_summary": tracking_summary(runs, limit, limit_is_given, reference, required),
     }

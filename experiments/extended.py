@@ -19,8 +19,15 @@ SAMPLES_PER_PERIOD = 4000
 PADE_ORDER = 2  # section 4.2
 
 
-def extended_tables(design: Design) -> dict[str, pd.DataFrame]:
-    """Run an extended design from rest, under the limit at which it leaves saturation when the thesis says.
+def extended_tables(design: Design, limit: float | None = None) -> dict[str, pd.DataFrame]:
+    """Run an extended design from rest.
+
+    Parameters
+    ----------
+    design
+        Of kind "extended".
+    limit
+        Of the actuator, +-limit; unless given, the one at which the loop leaves saturation when the thesis says.
 
     Returns
     -------
@@ -39,12 +46,14 @@ def extended_tables(design: Design) -> dict[str, pd.DataFrame]:
     required = reference.amplitude / abs(complex(design.loop_plant(1j * reference.omega)))
     horizon = PERIODS * 2 * np.pi / reference.omega
     exact = loops(design, reference)
-    limit = limit_for_last_saturation(exact["none"], printed()["extended"]["desaturation_s"], required, horizon)
+    limit_is_given = limit is not None
+    if limit is None:
+        limit = limit_for_last_saturation(exact["none"], printed()["extended"]["desaturation_s"], required, horizon)
     every = exact | {f"{name}_pade": with_pade(exact[name], PADE_ORDER) for name in ("none", "thesis")}
     runs = run_all(every, limit, np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1))
     return {
         "extended": tracking_table(runs),
-        "extended_summary": tracking_summary(runs, limit, reference, required),
+        "extended_summary": tracking_summary(runs, limit, limit_is_given, reference, required),
     }
 
 

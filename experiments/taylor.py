@@ -166,8 +166,9 @@ def integrate(
     Returns
     -------
     values (s, 1 + m), events (e,), modes (e,), tail, status, end
-        u and the outputs at the samples; event times with the mode entered (-1, 0, 1); the largest share of a
-        state that the series' last term had; COMPLETE, DIVERGED or CROWDED; the time reached.
+        u and the outputs at the samples; event times with the mode entered (-1, 0, 1); the largest that a series'
+        last term was, as a share of the largest that its state was in the whole run (a state that starts from
+        zero has only high terms at first); COMPLETE, DIVERGED or CROWDED; the time reached.
     """
     n, k, outputs = len(x0), len(delays), len(outputs_x)
     values = np.zeros((len(samples), 1 + outputs))
@@ -184,13 +185,13 @@ def integrate(
     for j in range(k):
         queue, generation, queued = _insert(queue, generation, queued, delays[j], 1)
 
-    x, scale = x0.copy(), np.abs(x0)
+    x, scale, last = x0.copy(), np.abs(x0), np.zeros(n)
     X, W, U = np.zeros((ORDER + 1, n)), np.zeros((k, ORDER + 1)), np.zeros(ORDER + 1)
     Y = np.zeros((outputs, ORDER + 1))
     u = _dot(C, x) + _dot(E, rest)
     mode = 1 if u > high else (-1 if u < low else 0)
     on_limit, standing = 0, 0
-    t, sample, tail, status = 0.0, 0, 0.0, COMPLETE
+    t, sample, status = 0.0, 0, COMPLETE
 
     while t < horizon:
         t_next = min(t + step, horizon)
@@ -254,8 +255,7 @@ def integrate(
                 x[r] = x[r] * reach + X[i, r]
         for r in range(n):
             scale[r] = max(scale[r], abs(x[r]))
-            if scale[r] > 0:
-                tail = max(tail, abs(X[ORDER, r]) * REACH**ORDER / scale[r])
+            last[r] = max(last[r], abs(X[ORDER, r]) * REACH**ORDER)
             if not abs(x[r]) < MOST:
                 status = DIVERGED
         standing = standing + 1 if reach == 0 else 0
@@ -281,4 +281,8 @@ def integrate(
             if depth < GENERATIONS:
                 for j in range(k):
                     queue, generation, queued = _insert(queue, generation, queued, reached + delays[j], depth + 1)
+    tail = 0.0
+    for r in range(n):
+        if scale[r] > 0:
+            tail = max(tail, last[r] / scale[r])
     return values, events[:event_count], modes[:event_count], tail, status, t

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
 from design.anti_windup import AntiWindup
 from design.contract import Design
-from experiments.closed_loop import Run, SaturatedLoop, simulate
+from experiments.closed_loop import DivergenceError, Run, SaturatedLoop, simulate
 from experiments.loops import design_loop
 from experiments.metrics import last_saturation, over_last, settling_time
 from experiments.scenarios import Reference
@@ -32,13 +33,35 @@ def loops(design: Design, reference: Reference) -> dict[str, SaturatedLoop]:
 
 
 def run_all(loops: Mapping[str, SaturatedLoop], limit: float, time_s: np.ndarray) -> dict[str, Run]:
-    """Simulate every loop under sat with +-limit."""
-    return {name: simulate(loop, (-limit, limit), time_s) for name, loop in loops.items()}
+    """Simulate every loop under sat with +-limit; one that diverges has NaN from there on.
+
+    An unstable controller (the H-infinity optimum may be one) diverges exponentially once the actuator has
+    saturated and no anti-windup holds it: that is a result, and it must not hide the other runs.
+    """
+    return {name: _run(loop, limit, time_s) for name, loop in loops.items()}
+
+
+def _run(loop: SaturatedLoop, limit: float, time_s: np.ndarray) -> Run:
+    try:
+        return simulate(loop, (-limit, limit), time_s)
+    except DivergenceError as error:
+        before = time_s[time_s < error.time_s]
+        if len(before) < 2:
+            raise
+        part = simulate(loop, (-limit, limit), before)
+        rest = np.full(len(time_s) - len(before), np.nan)
+        return replace(
+            part,
+            time_s=time_s,
+            control=np.append(part.control, rest),
+            saturated_control=np.append(part.saturated_control, rest),
+            outputs={name: np.append(values, rest) for name, values in part.outputs.items()},
+        )
 
 
 def tracking_table(runs: Mapping[str, Run]) -> pd.DataFrame:
     """time_s, reference and, for every run NAME, output_NAME, error_NAME, control_NAME, saturated_NAME."""
-    first = next(iter(runs.values()))
+    first = max(runs.values(), key=lambda run: int(np.isfinite(run.control).sum()))
     columns = {"time_s": first.time_s, "reference": first.outputs["reference"]}
     for name, run in runs.items():
         columns[f"output_{name}"] = run.outputs["output"]
@@ -48,7 +71,9 @@ def tracking_table(runs: Mapping[str, Run]) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
-def tracking_summary(runs: Mapping[str, Run], limit: float, reference: Reference, required: float) -> pd.DataFrame:
+def tracking_summary(
+    runs: Mapping[str, Run], limit: float, limit_is_given: bool, reference: Reference, required: float
+) -> pd.DataFrame:
     """One row a run: what the captions say.
 
     Parameters
@@ -57,6 +82,8 @@ def tracking_summary(runs: Mapping[str, Run], limit: float, reference: Reference
         Name -> run.
     limit
         Of the actuator, in its unit.
+    limit_is_given
+        Whether the user gave it; else it is the thesis's, printed or found.
     reference
         r(t).
     required
@@ -65,10 +92,11 @@ def tracking_summary(runs: Mapping[str, Run], limit: float, reference: Reference
     Returns
     -------
     DataFrame
-        run, limit, required, last_saturation_s (empty: saturated to the end), settling_s (error within 1 % of the
-        reference's amplitude, measured from the lasting offset of the error; empty: never), offset and
-        ripple (middle and half distance of the extremes of the error over the last period), peak_error_after_1s,
-        relative_error_percent (largest error of the last period over the reference's amplitude).
+        run, limit, limit_is_given (0 or 1), required, last_saturation_s (empty: saturated to the end), settling_s
+        (error within 1 % of the reference's amplitude, measured from the lasting offset of the error; empty:
+        never), offset and ripple (middle and half distance of the extremes of the error over the last period),
+        peak_error_after_1s, relative_error_percent (largest error of the last period over the reference's
+        amplitude). A run that diverges has empty cells.
     """
     rows = []
     period = 2 * np.pi / reference.omega
@@ -79,6 +107,7 @@ def tracking_summary(runs: Mapping[str, Run], limit: float, reference: Reference
             {
                 "run": name,
                 "limit": limit,
+                "limit_is_given": int(limit_is_given),
                 "required": required,
                 "last_saturation_s": last_saturation(run),
                 "settling_s": settling_time(run.time_s, error - offset, SETTLED * abs(reference.amplitude)),

@@ -16,6 +16,8 @@ def chosen_limit(tables: Mapping[str, pd.DataFrame]) -> str:
     """Say how the limits, which are not printed, were chosen."""
     summary = tables["extended_summary"]
     limit, time_s = (of_run(summary, "none", column) for column in ("limit", "last_saturation_s"))
+    if of_run(summary, "none", "limit_is_given"):
+        return f"Under the given limits of +-{number(limit, 4)} the loop without anti-windup {last_saturated(time_s)}."
     return (
         f"Chapter 4 prints no limits; +-{number(limit, 4)} are those under which the program finds that the loop "
         f"without anti-windup leaves saturation at around 4 seconds, as the text says: it {last_saturated(time_s)}."

@@ -21,16 +21,21 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     limit = of_run(summary, "none", "limit")
     beyond = {run: table[f"control_{run}"].abs() - limit for run in ("thesis", "corrected")}
     thesis, corrected = (
-        f"exceeds them by up to {number(excess.max())}, for {number(100 * (excess > 0).mean(), 2)} % of the time, and "
-        f"{last_saturated(of_run(summary, run, 'last_saturation_s'))}"
+        (
+            f"exceeds them by up to {number(excess.max())}, for {number(100 * (excess > 0).mean(), 2)} % of the time, "
+            f"and {last_saturated(of_run(summary, run, 'last_saturation_s'))}"
+            if excess.max() > 0
+            else "does not reach them"
+        )
         for run, excess in beyond.items()
     )
+    whose = "given" if of_run(summary, "none", "limit_is_given") else "printed"
     return (
         "Controller output u and saturated input sat(u) in the run of Fig. 2.12 (thesis Fig. 2.13): (a) with the "
-        "thesis's theta1~, (b) with the corrected one, which has theta1~(0) = -1; dotted: the printed limits of "
-        f"+-{number(limit)}. The text says that the controller output is truncated at the limits. What is truncated is "
-        f"sat(u); u itself {thesis} in a run of {number(table['time_s'].iloc[-1])} s with the thesis's theta1~, and "
-        f"with the corrected one {corrected}."
+        "thesis's theta1~, (b) with the corrected one, which has theta1~(0) = -1; dotted: the "
+        f"{whose} limits of +-{number(limit)}. The text says that the controller output is truncated at the limits. "
+        f"What is truncated is sat(u); u itself {thesis} in a run of {number(table['time_s'].iloc[-1])} s with the "
+        f"thesis's theta1~, and with the corrected one {corrected}."
     )
 
 

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures import panels
-from paper_figures.captions import largest, last_saturated, of_run, required_input
+from paper_figures.captions import largest, last_saturated, number, of_run, required_input
 from paper_figures.panels import NONE
 from paper_figures.style import COLUMN_WIDTH, styled
 
@@ -20,13 +20,19 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     table, summary = tables["delay_free"], tables["delay_free_summary"]
     early = table["time_s"] <= table["time_s"].iloc[-1] / 2
     error, control = (table[column].abs() for column in ("error_none", "control_none"))
-    grows = "grows" if control[~early].max() > control[early].max() else "does not grow"
+    if control.isna().any():
+        end = table["time_s"][control.notna()].iloc[-1]
+        behaviour = f"diverges, past 1e100 at about {number(end)} s: the stabiliser is unstable by itself"
+    else:
+        behaviour = (
+            f"{'grows' if control[~early].max() > control[early].max() else 'does not grow'}: |u| reaches "
+            f"{largest(control[early])} in the first half of the run and {largest(control[~early])} in the second, |e| "
+            f"{largest(error[early])} and {largest(error[~early])}, and u "
+            f"{last_saturated(of_run(summary, 'none', 'last_saturation_s'))}"
+        )
     return (
         "Tracking with input saturation without anti-windup (thesis Fig. 2.14): (a) reference r and output y, (b) "
-        f"tracking error. {required_input(summary)}. The text calls this loop unstable; the control {grows}: |u| "
-        f"reaches {largest(control[early])} in the first half of the run and {largest(control[~early])} in the second, "
-        f"|e| {largest(error[early])} and {largest(error[~early])}, and u "
-        f"{last_saturated(of_run(summary, 'none', 'last_saturation_s'))}."
+        f"tracking error. {required_input(summary)}. The text calls this loop unstable; the control {behaviour}."
     )
 
 

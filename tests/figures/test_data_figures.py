@@ -69,7 +69,7 @@ def tracking_tables(name: str) -> Tables:
         columns[f"saturated_{run}"] = np.clip(columns[f"control_{run}"], -6.5, 6.5)
         rows.append(
             {
-                **{"run": run, "limit": 6.5, "required": 7.25, "last_saturation_s": 3.125 + k},
+                **{"run": run, "limit": 6.5, "limit_is_given": 0, "required": 7.25, "last_saturation_s": 3.125 + k},
                 **{"settling_s": 4.5 + k, "offset": -2.5 - k, "ripple": 0.625 + k},
                 **{"peak_error_after_1s": 1.375 + k, "relative_error_percent": 62.5 + k},
             }
@@ -322,6 +322,26 @@ def test_caption_says_what_the_summary_says(name, column):
     summary = tables[module.TABLES[1]]
     summary[column] = summary[column] * 1.5
     assert module.caption(tables) != before
+
+
+@pytest.mark.parametrize("name", ["fig_2_13", "fig_4_01", "fig_4_02", "fig_4_03", "fig_4_04"])
+def test_caption_says_whose_the_limits_are(name):
+    tables = tables_of(name)
+    module = figure_module(name)
+    tables[module.TABLES[1]]["limit_is_given"] = 1
+    assert "given limits of +-6.5" in module.caption(tables)
+    assert "prints no limits" not in module.caption(tables)
+
+
+def test_a_run_that_diverges_is_drawn_as_far_as_it_goes_and_said_to_diverge():
+    tables = tracking_tables("delay_free")
+    gone = tables["delay_free"]["time_s"] > 2.0
+    columns = [column for column in tables["delay_free"] if str(column).endswith("_none")]
+    tables["delay_free"].loc[gone, columns] = np.nan
+    module = figure_module("fig_2_14")
+    assert "the control diverges, past 1e100 at about 2 s" in module.caption(tables)
+    (line,) = lettered(module.draw(tables))[1].lines
+    assert 1.5 < line.get_xdata()[np.isfinite(line.get_ydata())].max() <= 2.0
 
 
 @each_figure

@@ -46,6 +46,8 @@ def strict_snapshot(num_regression: NumericRegressionFixture, request: pytest.Fi
 
     def check(name: str, columns: Mapping[str, np.ndarray]) -> None:
         stored = request.path.with_suffix("") / f"{name}.csv"
+        if request.config.getoption("force_regen"):
+            stored.unlink(missing_ok=True)
 
         def compare(data: dict[str, np.ndarray], rtol: float) -> None:
             tolerances = {key: {"rtol": 0.0, "atol": rtol * float(np.abs(v).max())} for key, v in data.items()}
