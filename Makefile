@@ -74,12 +74,17 @@ $(READY): requirements.lock pyproject.toml
 	@touch $@
 
 # Remember what was asked for, so that another MODEL or other SWEEPS rebuild what depends on them.
+ifeq (,$(filter grouped-target,$(.FEATURES)))
+$(error GNU make 4.3 or newer is needed, found $(MAKE_VERSION))
+endif
 ifneq (,$(filter figures $(BUILD)/%,$(MAKECMDGOALS)))
 MISSING := $(filter-out $(FITTED) $(wildcard $(SWEEPS) $(MODEL_FILE)),$(SWEEPS) $(MODEL_FILE))
 $(if $(MISSING),$(error $(MISSING): no such file; expected sweep files in SWEEPS, or table, implied or a model.json in MODEL))
 $(if $(SWEEPS),,$(error SWEEPS is empty; expected one or more sweep files))
+ifeq (,$(findstring n,$(firstword -$(MAKEFLAGS))))
 $(shell mkdir -p $(RESULTS) $(FIGURES); printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' '$(LIMIT)' | cmp -s - $(CHOICE) || \
 	printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' '$(LIMIT)' > $(CHOICE))
+endif
 endif
 
 $(FITTED): $(SWEEPS) $(wildcard identification/*.py) $(if $(MODEL),,$(CHOICE)) | $(READY)

@@ -34,11 +34,13 @@ def delay_free(model: str, period: float, epsilon: float, output: Path) -> None:
     """Chapter 2: internal model, H-infinity stabiliser, anti-windup; the plant's dead time is ignored."""
     design = design_delay_free(read_model(model), period, epsilon)
     hinf = design.hinf or {}
+    unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
     _finish(
         design,
+        model,
         output,
         f"H-infinity stabiliser: ||[W1 S; W2 T]|| = {hinf['gamma']:.4g}, no stabilising controller below "
-        f"{hinf['gamma_lower']:.4g}; every pole left of -{hinf['decay_rate']:.4g} 1/s",
+        f"{hinf['gamma_lower']:.4g}; every closed-loop pole left of -{hinf['decay_rate']:.4g} 1/s{unstable}",
     )
 
 
@@ -54,11 +56,12 @@ def extended(model: str, reference_omega: float, a: float, e: float, f: float, m
     """Chapters 3 and 4: Smith predictor based controller and anti-windup with the exact dead time."""
     design = design_extended(read_model(model), reference_omega, a, e, f, method)
     poles = ", ".join(f"{pole:.4g}" for pole in design.blocks["T_so"].poles)
-    _finish(design, output, f"Q designed by its {method}; closed loop with 1/s has the poles {poles}")
+    _finish(design, model, output, f"Q designed by its {method}; closed loop with 1/s has the poles {poles}")
 
 
-def _finish(design: Design, output: Path, summary: str) -> None:
-    write_whole({output: lambda path: path.write_text(design.to_json(), encoding="utf-8")})
+def _finish(design: Design, model: str, output: Path, summary: str) -> None:
+    text = design.to_json()
+    write_whole({output: lambda path: path.write_text(text, encoding="utf-8")}, inputs=[Path(model)])
     click.echo(f"{design.kind} design -> {output}")
     click.echo(f"  {summary}")
     for name, facts in design.anti_windup.items():

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.files import InputError
+from identification.model import number
 from identification.plant import AdditiveBound, Complex, Mode, PlantModel
 
 
@@ -105,12 +106,14 @@ class Block:
         """Read what :meth:`to_dict` writes; raises InputError when it is not of that form."""
         try:
             return cls(
-                float(content["gain"]),
+                number(content, "gain"),
                 tuple(complex(real, imag) for real, imag in content["zeros"]),
                 tuple(complex(real, imag) for real, imag in content["poles"]),
-                float(content["delay_s"]),
+                number(content, "delay_s"),
             )
-        except (KeyError, TypeError, ValueError) as error:
+        except InputError:
+            raise
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise InputError(f"a block is not of the form gain, zeros, poles, delay_s ({error})") from None
 
 

@@ -115,6 +115,10 @@ def read_design(path: Path) -> Design:
         for name in needed:
             if name not in design.blocks:
                 raise InputError(f"the block '{name}' is missing")
+            if design.blocks[name].delay_s:
+                raise InputError(f"the block '{name}' has a dead time; expected none, the loop has the plant's")
+        if not design.reference_omega > 0:
+            raise InputError(f"reference_omega is {design.reference_omega:g}; expected a positive number")
         design.thesis_anti_windup()
         design.corrected_anti_windup()
     except InputError as error:

@@ -10,12 +10,13 @@ from design.anti_windup import compensators, second_order
 from design.block import Block, bound_block, plant_denominator, plant_numerator
 from design.contract import Design
 from design.internal_model import internal_model, reference_polynomial
-from design.mixed_sensitivity import mixed_sensitivity
+from design.mixed_sensitivity import SynthesisError, mixed_sensitivity
 from identification.files import InputError
 from identification.model import IdentifiedModel
 
 TRACKING = 0.01  # W1 asks for |S| below gamma times this at the reference's frequencies
 SETTLED = 0.01  # what is left of a transient after one period of the reference
+ATTEMPTS = 6  # with the decay rate doubled each time the synthesis fails its own check
 
 
 def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -> Design:
@@ -47,7 +48,8 @@ def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -
 
     W1 has the reference's poles, damped: moved left by twice the decay rate, which makes the stabiliser's
     zeros there cancel, and W1(0) = 1/TRACKING. The decay rate leaves SETTLED of a transient after one period,
-    or is half that of the slowest mode of plant and bound where these decay more slowly.
+    or is half that of the slowest mode of plant and bound where these decay more slowly. Where the reference is
+    slower than the plant by many decades the arithmetic may fail its own check; then the decay rate is doubled.
 
     C = K A/Lambda has a zero at the plant's pole s = 0 (A(0) = 0; Lemma 1 assumes a stable A): the integrator is
     hidden from the loop and not stabilised, so that a constant disturbance at the plant's input makes y drift.
@@ -64,16 +66,22 @@ def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -
     units = internal_model(plant, omega, epsilon)
     A, B, W_a = plant_denominator(plant), plant_numerator(plant), bound_block(model.additive_bound)
     slowest = min(-root.real for root in A.zeros + B.zeros + W_a.poles if root != 0)
-    decay_rate = min(math.log(1 / SETTLED) / period_s, slowest / 2)
+    wanted = min(math.log(1 / SETTLED) / period_s, slowest / 2)
 
     fastest = max(abs(root) for root in A.zeros + B.zeros + W_a.poles + units.Lambda.zeros)
     W2 = W_a * A * B.inverse()
     missing = (W2 * units.G_A).relative_degree
     W2 = W2 * Block((2 * fastest) ** -missing, (complex(-2 * fastest),) * missing)
-    damped = tuple(root - 2 * decay_rate for root in reference_polynomial(omega, epsilon).zeros)
-    W1 = Block(float(np.prod(np.abs(damped))) / TRACKING, (), damped)
-    synthesis = mixed_sensitivity(units.G_A, W1, W2, decay_rate)
-
+    for attempt in range(ATTEMPTS):
+        decay_rate = min(wanted * 2**attempt, slowest / 2)
+        damped = tuple(root - 2 * decay_rate for root in reference_polynomial(omega, epsilon).zeros)
+        W1 = Block(float(np.prod(np.abs(damped))) / TRACKING, (), damped)
+        try:
+            synthesis = mixed_sensitivity(units.G_A, W1, W2, decay_rate)
+            break
+        except SynthesisError:
+            if attempt == ATTEMPTS - 1 or decay_rate == slowest / 2:
+                raise
     anti_windup = compensators(model, rate=2 * decay_rate)
     thesis = second_order(*(anti_windup["thesis"][key] for key in ("alpha", "beta", "gamma")))
     return Design(

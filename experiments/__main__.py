@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import click
@@ -28,6 +28,8 @@ from identification.model import read_model
 OUTPUT_FOLDER = click.option(
     "--output", type=click.Path(path_type=Path, file_okay=False), required=True, help="Existing folder for the tables."
 )
+MOST_ROWS = 1e7
+
 LIMIT = click.option("--limit", type=float, help="Saturation limits +-LIMIT, instead of the thesis's.")
 DESIGN = click.argument("design", type=click.Path(path_type=Path, dir_okay=False))
 
@@ -70,6 +72,8 @@ def simulate_command(
         raise InputError(
             f"--until is {until:g} and --sample-time {sample_time:g}; expected 0 < sample time <= until, both finite"
         )
+    if until / sample_time > MOST_ROWS:
+        raise InputError(f"{until / sample_time:.3g} rows are asked for; expected at most {MOST_ROWS:.3g}")
     content = read_design(design)
     kind = _compensator(content, anti_windup, {"alpha": alpha, "beta": beta, "gamma": gamma})
     usual = thesis_reference(content.kind, content.reference_omega)
@@ -92,7 +96,7 @@ def simulate_command(
             "saturated_control": run.saturated_control,
         }
     )
-    write_tables({output: table})
+    write_tables({output: table}, inputs=[design])
     saturated = last_saturation(run)
     said = "saturated to the end" if np.isnan(saturated) else f"last saturated at {saturated:.6g} s"
     click.echo(f"{len(table)} rows -> {output}; {len(run.events_s)} crossings of the limits, {said}")
@@ -184,7 +188,7 @@ def _write(folder: Path, tables: Mapping[str, pd.DataFrame]) -> None:
     write_tables({folder / f"{name}.csv": table for name, table in tables.items()})
 
 
-def write_tables(tables: Mapping[Path, pd.DataFrame]) -> None:
+def write_tables(tables: Mapping[Path, pd.DataFrame], inputs: Iterable[Path] = ()) -> None:
     """Write tables as CSV with 12 significant digits, all of them or none; NaN is written as an empty cell."""
     write_whole(
         {
@@ -192,7 +196,8 @@ def write_tables(tables: Mapping[Path, pd.DataFrame]) -> None:
                 partial, index=False, float_format="%.12g", lineterminator="\n"
             )
             for path, table in tables.items()
-        }
+        },
+        inputs,
     )
 
 

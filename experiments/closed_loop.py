@@ -11,6 +11,8 @@ from scipy.sparse import csr_array
 from experiments import taylor
 from identification.files import InputError
 
+MOST_STEPS = 2e7  # a few minutes
+
 
 @dataclass(frozen=True)
 class SaturatedLoop:
@@ -88,7 +90,8 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
     Raises
     ------
     InputError
-        The limits are not in order, the times not increasing, or the control chatters past all bounds.
+        The limits are not in order, the times not increasing, the run too long for
+        its fastest time constant, or the control chatters past all bounds.
     DivergenceError
         The loop diverges.
 
@@ -110,6 +113,11 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
     horizon = float(time_s[-1])
     # 1.5 time constants of the fastest mode leave its last term, read REACH steps on, below the tolerance
     step = min([1.5 / fastest if fastest > 0 else horizon, *loop.delays])
+    if horizon / step > MOST_STEPS:
+        raise InputError(
+            f"the run needs {horizon / step:.3g} steps of {step:.3g} s, set by its shortest dead time or fastest pole; "
+            f"expected at most {MOST_STEPS:.3g} (a shorter run, a dead time of zero, or a slower design)"
+        )
     rows = list(loop.outputs.values())
     outputs_x = np.array([x for x, _ in rows]).reshape(len(rows), len(loop.x0))
     outputs_w = np.array([w for _, w in rows]).reshape(len(rows), len(loop.delays))

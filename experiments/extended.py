@@ -45,10 +45,11 @@ def extended_tables(design: Design, limit: float | None = None) -> dict[str, pd.
     reference = thesis_reference("extended", design.reference_omega)
     required = reference.amplitude / abs(complex(design.loop_plant(1j * reference.omega)))
     horizon = PERIODS * 2 * np.pi / reference.omega
+    target = printed()["extended"]["desaturation_s"]
     exact = loops(design, reference)
     limit_is_given = limit is not None
     if limit is None:
-        limit = limit_for_last_saturation(exact["none"], printed()["extended"]["desaturation_s"], required, horizon)
+        limit = limit_for_last_saturation(exact["none"], target, required, max(horizon, PERIODS * target))
     every = exact | {f"{name}_pade": with_pade(exact[name], PADE_ORDER) for name in ("none", "thesis")}
     runs = run_all(every, limit, np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1))
     return {
@@ -74,7 +75,7 @@ def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: fl
     Raises
     ------
     InputError
-        No limit between ``required`` and 64 times it brings the last saturation below ``target_s``.
+        No limit between ``required`` and 64 times it brings the last saturation below ``target_s``, or every one does.
 
     Notes
     -----
@@ -88,6 +89,11 @@ def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: fl
         return time if np.isfinite(time) else np.inf
 
     low, high = required, 2 * required
+    if last(low) <= target_s:
+        raise InputError(
+            f"at {low:.4g}, the least limit that lets the loop follow, it leaves saturation before {target_s:g} s; "
+            "expected a slower loop, or a limit of your own (--limit)"
+        )
     while last(high) > target_s:
         low, high = high, 2 * high
         if high > 64 * required:

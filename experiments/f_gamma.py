@@ -27,7 +27,8 @@ def f_gamma_tables(bound: AdditiveBound) -> dict[str, pd.DataFrame]:
     """
     alpha, beta, gamma = thesis_choice(bound)
     rows = []
-    gammas = np.linspace(0.0, 3 * gamma, 301)
+    # gamma > -1 keeps the zeros of 1 + theta1~ stable; a bound without resonance may have its optimum below 0
+    gammas = np.linspace(0.0, 3 * gamma, 301) if gamma > 1 else np.linspace(-0.999, 3.0, 301)
     for candidate in beta_grid(alpha):
         for value in np.union1d(gammas, optimal_gamma(bound, alpha, candidate)[0]):
             cost, _ = uncertainty_cost(bound, second_order(alpha, candidate, value).one_plus)

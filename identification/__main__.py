@@ -66,7 +66,7 @@ def fit(sweeps: tuple[Path, ...], output: Path, modes: int | None, seed: int, fi
             drawing = draw_fit(tests, result.plant, report.bound)
             dateless = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}, ".png": {}}[figure.suffix]
             writers[figure] = lambda path: drawing.savefig(path, dpi=300, metadata=dateless)
-        write_whole(writers)
+        write_whole(writers, inputs=sweeps)
     click.echo(_table(result, report))
 
 

@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
 
 class InputError(ValueError):
     """Something the user gave cannot be used; the message is one sentence saying what, where and what else."""
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
 
 
 class Refusal(click.ClickException):
@@ -22,13 +29,20 @@ class Refusal(click.ClickException):
 
 
 class CommandGroup(click.Group):
-    """A click group whose commands answer an :class:`InputError` with its sentence and exit status 2."""
+    """A click group whose commands answer an :class:`InputError` with its sentence and exit status 2.
+
+    So they do when finite numbers lead out of what floating point can hold: an overflow, a singular matrix, an
+    array larger than the memory.
+    """
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
+            with np.errstate(over="raise"):
+                return super().invoke(ctx)
         except InputError as error:
             raise Refusal(str(error)) from None
+        except (ArithmeticError, np.linalg.LinAlgError, MemoryError) as error:
+            raise Refusal(f"the numbers given are too extreme to compute with ({error})") from None
 
 
 def read_text(path: Path) -> str:
@@ -49,7 +63,7 @@ def read_text(path: Path) -> str:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
 
 
-def write_whole(writers: Mapping[Path, Callable[[Path], object]]) -> None:
+def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterable[Path] = ()) -> None:
     """Write several files so that either all of them appear, whole, or none does.
 
     Parameters
@@ -57,25 +71,34 @@ def write_whole(writers: Mapping[Path, Callable[[Path], object]]) -> None:
     writers
         For each path, a function that writes the whole file to the temporary path it is given; that
         path lies in the same folder and has the same suffix.
+    inputs
+        Files that were read, which must not be written over.
 
     Raises
     ------
     InputError
-        A folder does not exist or may not be written to.
+        A target is one of the inputs, exists and is no regular file, or may not be written.
     """
+    read = {path.resolve() for path in inputs}
+    for path in writers:
+        if path.resolve() in read:
+            raise InputError(f"{path}: is an input too; expected another file to write")
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path}: cannot be written; expected a file, found something else")
     written: dict[Path, Path] = {}
+    target = next(iter(writers), Path())
     try:
-        for path, write in writers.items():
-            try:
-                handle, name = tempfile.mkstemp(dir=path.parent, prefix=".partial-", suffix=path.suffix)
-            except OSError as error:
-                raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+        for target, write in writers.items():
+            goal = target.resolve()  # a link is followed, not replaced
+            handle, name = tempfile.mkstemp(dir=goal.parent, prefix=".partial-", suffix=goal.suffix)
             os.close(handle)
-            written[path] = Path(name)
-            write(written[path])
-            written[path].chmod(0o644)
-        for path, temporary in written.items():
-            temporary.replace(path)
+            written[goal] = Path(name)
+            write(written[goal])
+            written[goal].chmod(0o666 & ~_umask())
+        for target, temporary in written.items():
+            temporary.replace(target)
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written ({error.strerror})") from None
     finally:
         for temporary in written.values():
             temporary.unlink(missing_ok=True)

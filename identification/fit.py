@@ -13,13 +13,14 @@ from identification.files import InputError
 from identification.frequency_response import FrequencyResponse
 from identification.likelihood import Likely
 from identification.model import plant_to_dict
-from identification.one_test import OneFit, ScaledTest, plant_from_theta
+from identification.one_test import OneFit, ScaledTest, Undetermined, plant_from_theta
 from identification.plant import PlantModel
 
 Real = NDArray[np.float64]
 
 MOST_MODES = 4
 WHITE = 0.1  # correlation of neighbouring residuals below which nothing is left to explain
+INSIGNIFICANT = 2.0  # a delay below this many standard errors of the noise is taken as none: it is bounded by 0
 CORRELATED = 0.3  # correlation of neighbouring residuals above which a fit missed something
 
 
@@ -92,7 +93,8 @@ def fit_plant(
     -----
     Each test is fitted on its own and the parameters are averaged: a fit to the mean of responses whose resonances
     differ would be too well damped. Each fit starts from :func:`identification.start.guesses` and maximises the
-    likelihood of complex Gaussian errors of variance a^2 + b^2 |P|^2, a and b included.
+    likelihood of complex Gaussian errors of variance a^2 + b^2 |P|^2, a and b included. A mean delay within two
+    standard errors of zero is reported as zero, its bound; each test's own estimate stays in its fit.
     """
     if not tests:
         raise InputError("no test was given; expected one or more sweeps")
@@ -128,7 +130,15 @@ def fit_plant(
         for test, fit in zip(scaled, found[best], strict=True)
     ]
     criterion[best] = _criterion(scaled, chosen)
-    return _nominal(tuple(test.finish(fit) for test, fit in zip(scaled, chosen, strict=True)), criterion)
+    while True:
+        try:
+            return _nominal(tuple(test.finish(fit) for test, fit in zip(scaled, chosen, strict=True)), criterion)
+        except Undetermined:
+            # exact data leave a richer model nothing but rounding to explain
+            if modes is not None or best - 1 not in found:
+                raise
+            best -= 1
+            chosen = found[best]
 
 
 def _fit_all(
@@ -160,9 +170,13 @@ def _nominal(tests: tuple[OneFit, ...], criterion: dict[int, float]) -> FitResul
         )
     thetas = np.array([test.theta for test in tests])
     count = len(tests)
+    theta = thetas.mean(axis=0)
+    noise = np.sqrt(np.sum([test.errors**2 for test in tests], axis=0)) / count
+    if theta[-1] < INSIGNIFICANT * noise[-1]:
+        theta[-1] = 0.0
     return FitResult(
-        plant=plant_from_theta(thetas.mean(axis=0), signs.pop()),
-        noise=np.sqrt(np.sum([test.errors**2 for test in tests], axis=0)) / count,
+        plant=plant_from_theta(theta, signs.pop()),
+        noise=noise,
         scatter=thetas.std(axis=0, ddof=1) / np.sqrt(count) if count > 1 else None,
         tests=tests,
         criterion=criterion,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
@@ -185,6 +186,7 @@ def _read_table(path: Path) -> _Table:
         dtype=str,
         keep_default_na=False,
         skipinitialspace=True,
+        quoting=csv.QUOTE_NONE,
     )
     lines = np.array([n for n, _ in rows[1:]])
     columns = {}

@@ -123,7 +123,7 @@ def read_json(path: Path, schema: int) -> dict[str, Any]:
         content = json.loads(text, parse_constant=_refuse_constant)
     except json.JSONDecodeError as error:
         raise InputError(f"{path}, line {error.lineno}: not JSON ({error.msg})") from None
-    except InputError as error:
+    except (RecursionError, ValueError) as error:  # an InputError among them
         raise InputError(f"{path}: {error}") from None
     found = content.get("schema") if isinstance(content, dict) else None
     if found != schema:
@@ -144,7 +144,10 @@ def number(content: Mapping[str, Any], key: str) -> float:
     value = content.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"'{key}' is {value!r}; expected a number")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise InputError(f"'{key}' is an integer too large for a number") from None
 
 
 def _modes(content: Mapping[str, Any], key: str) -> tuple[Mode, ...]:

@@ -32,6 +32,10 @@ WORST = 0.5  # median distance over the response above which nothing was fitted
 SINGULAR = 1e-13  # smallest eigenvalue of the scaled information matrix that can be inverted
 
 
+class Undetermined(InputError):
+    """The data do not determine the parameters of a model."""
+
+
 @dataclass(frozen=True)
 class OneFit:
     """The plant of one test.
@@ -214,7 +218,7 @@ class ScaledTest:
         scale = 1 / np.sqrt(np.diag(information))
         values, vectors = np.linalg.eigh(information * scale[:, None] * scale)
         if not values[0] > SINGULAR:
-            raise InputError(
+            raise Undetermined(
                 f"{self.name}: the data do not determine {n} mode pairs; expected fewer modes or more lines"
             )
         freedom = 2 * self.omega.size - likely.theta.size

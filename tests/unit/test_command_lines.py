@@ -192,6 +192,77 @@ def test_experiments_refuse_a_missing_block(runner: CliRunner, tmp_path: Path, e
     refused(result, "extended.json", "'T_so' is missing")
 
 
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("frequency_hz,magnitude_db\n1,2\n", ["phase_deg"]),
+        ("frequency_hz,magnitude_db,phase_deg\n1,2,3\n2,x,3\n", ["line 3", "'x'"]),
+        ("frequency_hz,magnitude_db,phase_deg\n2,2,3\n1,2,3\n", ["line 3"]),
+        ("", []),
+        ('frequency_hz,magnitude_db,phase_deg\n"1,2,3\n', ["line 2"]),
+    ],
+)
+def test_additive_error_refuses_bad_sweeps(runner: CliRunner, tmp_path: Path, text: str, parts: list[str]) -> None:
+    sweep, output = tmp_path / "sweep.csv", tmp_path / "tables"
+    sweep.write_text(text, encoding="utf-8")
+    output.mkdir()
+    refused(
+        runner.invoke(experiments_main, ["additive-error", "implied", str(sweep), "--output", str(output)]),
+        "sweep.csv",
+        *parts,
+    )
+    assert not list(output.iterdir())
+
+
+def test_no_command_writes_over_its_input(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
+    before = extended_json.read_text(encoding="utf-8")
+    result = runner.invoke(
+        experiments_main, ["simulate", str(extended_json), *SIMULATE, "--output", str(extended_json)]
+    )
+    refused(result, "is an input too")
+    assert extended_json.read_text(encoding="utf-8") == before
+
+
+def test_outputs_are_files_and_links_are_followed(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
+    target, link = tmp_path / "real.csv", tmp_path / "link.csv"
+    target.write_text("old", encoding="utf-8")
+    link.symlink_to(target)
+    arguments = ["simulate", str(extended_json), *SIMULATE, "--output"]
+    assert runner.invoke(experiments_main, [*arguments, str(link)]).exit_code == 0
+    assert link.is_symlink()
+    assert target.read_text(encoding="utf-8").startswith("time_s")
+    assert runner.invoke(experiments_main, [*arguments, str(tmp_path)]).exit_code == 2
+    assert not list(tmp_path.glob(".partial-*"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["delay-free", "implied", "--period", "1e-300"], ""),
+        (["extended", "implied", "--reference-omega", "1.5", "--a", "1e300", "--e", "2", "--f", "1"], ""),
+    ],
+)
+def test_extreme_numbers_get_a_sentence(runner: CliRunner, tmp_path: Path, arguments: list[str], part: str) -> None:
+    output = tmp_path / "design.json"
+    refused(runner.invoke(design_main, [*arguments, "--output", str(output)]), part)
+    assert not output.exists()
+
+
+def test_a_run_of_too_many_steps_or_rows_is_refused(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
+    arguments = [
+        "simulate",
+        str(extended_json),
+        "--limit",
+        "12",
+        "--anti-windup",
+        "none",
+        "--output",
+        str(tmp_path / "r"),
+    ]
+    refused(runner.invoke(experiments_main, [*arguments, "--until", "1", "--sample-time", "1e-12"]), "rows")
+    refused(runner.invoke(experiments_main, [*arguments, "--until", "1e7", "--sample-time", "1e6"]), "steps")
+
+
 def test_additive_error_refuses_a_missing_sweep(runner: CliRunner, tmp_path: Path) -> None:
     arguments = ["additive-error", "implied", str(tmp_path / "none.csv"), "--output", str(tmp_path)]
     refused(runner.invoke(experiments_main, arguments), "none.csv")
