@@ -81,7 +81,7 @@ ifneq (,$(filter figures $(BUILD)/%,$(MAKECMDGOALS)))
 MISSING := $(filter-out $(FITTED) $(wildcard $(SWEEPS) $(MODEL_FILE)),$(SWEEPS) $(MODEL_FILE))
 $(if $(MISSING),$(error $(MISSING): no such file; expected sweep files in SWEEPS, or table, implied or a model.json in MODEL))
 $(if $(SWEEPS),,$(error SWEEPS is empty; expected one or more sweep files))
-ifeq (,$(findstring n,$(firstword -$(MAKEFLAGS))))
+ifeq (,$(findstring n,$(filter-out -%,$(firstword $(MAKEFLAGS)))))
 $(shell mkdir -p $(RESULTS) $(FIGURES); printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' '$(LIMIT)' | cmp -s - $(CHOICE) || \
 	printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' '$(LIMIT)' > $(CHOICE))
 endif
