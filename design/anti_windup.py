@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -11,7 +12,7 @@ from scipy.optimize import minimize_scalar
 from design.block import Block, bound_block, plant_block
 from design.frequency import frequency_grid, peak
 from identification.files import InputError
-from identification.model import IdentifiedModel
+from identification.model import IdentifiedModel, number
 from identification.plant import AdditiveBound, PlantModel
 
 
@@ -61,6 +62,11 @@ def second_order(alpha: float, beta: float, gamma: float) -> AntiWindup:
         theta1_tilde=Block(gamma / (alpha * beta), (), poles),
         one_plus=Block(1.0, (complex(far), complex(near)), poles),
     )
+
+
+def printed_form(numbers: Mapping[str, Any]) -> AntiWindup:
+    """theta1~ of (2.23) from the members alpha, beta, gamma of an object; raises InputError as they are missing."""
+    return second_order(number(numbers, "alpha"), number(numbers, "beta"), number(numbers, "gamma"))
 
 
 def washout(bound: AdditiveBound, rate: float) -> AntiWindup:

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from design.anti_windup import AntiWindup, second_order, washout
+from design.anti_windup import AntiWindup, printed_form, washout
 from design.block import Block
 from identification.files import InputError
 from identification.model import bound_from_dict, member, number, plant_from_dict, plant_to_dict, read_json
@@ -58,7 +58,7 @@ class Design:
 
     def thesis_anti_windup(self) -> AntiWindup:
         """theta1~ of (2.23) with the design's alpha, beta and gamma."""
-        return second_order(*(number(self.anti_windup["thesis"], key) for key in ("alpha", "beta", "gamma")))
+        return printed_form(self.anti_windup["thesis"])
 
     def corrected_anti_windup(self) -> AntiWindup:
         """theta1~ with theta1~(0) = -1."""

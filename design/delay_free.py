@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from design.anti_windup import compensators, second_order
+from design.anti_windup import compensators, printed_form
 from design.block import Block, bound_block, plant_denominator, plant_numerator
 from design.contract import Design
 from design.internal_model import internal_model, reference_polynomial
@@ -83,7 +83,7 @@ def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -
             if attempt == ATTEMPTS - 1 or decay_rate == slowest / 2:
                 raise
     anti_windup = compensators(model, rate=2 * decay_rate)
-    thesis = second_order(*(anti_windup["thesis"][key] for key in ("alpha", "beta", "gamma")))
+    thesis = printed_form(anti_windup["thesis"])
     return Design(
         kind="delay-free",
         plant=model.plant,

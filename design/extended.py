@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from design.anti_windup import compensators, second_order
+from design.anti_windup import compensators, printed_form
 from design.block import Block, plant_block
 from design.contract import Design
 from design.smith_predictor import free_part, stabiliser
@@ -61,7 +61,7 @@ def design_extended(
     F1 = plant_block(model.plant)
     F2 = (K_1 * Block(1.0, (0j,)) * free.T_so).scaled(-1.0)  # W_aw/(K R_0) with W_aw = -s T_so, Eq. (3.29)
     anti_windup = compensators(model, rate=a)
-    thesis = second_order(*(anti_windup["thesis"][key] for key in ("alpha", "beta", "gamma")))
+    thesis = printed_form(anti_windup["thesis"])
     return Design(
         kind="extended",
         plant=model.plant,

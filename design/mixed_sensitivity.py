@@ -8,8 +8,8 @@ import numpy as np
 from scipy.linalg import LinAlgError, eigvals, schur, solve_continuous_are, solve_continuous_lyapunov
 
 from design.block import Block, geometric_scale
+from design.closed_loop import closed_loop_norm, closed_loop_poles
 from design.factorisation import balance, to_block, without
-from design.frequency import peak
 from design.realization import realize
 from identification.files import InputError
 
@@ -101,7 +101,9 @@ def mixed_sensitivity(G: Block, W1: Block, W2: Block, decay_rate: float) -> Synt
     """
     _check(G, W1, W2, decay_rate)
     moved = G.shifted(-decay_rate), W1.shifted(-decay_rate), W2.shifted(-decay_rate)
-    line_lower, K = _bisect(*moved)
+    problem = _assemble(*moved)
+    line_lower, feasible = _bisect(problem)
+    K = _controller(problem, feasible, moved[1].poles)
     line = closed_loop_norm(*moved, K)
     K = K.shifted(decay_rate)
     poles = closed_loop_poles(G, K)
@@ -112,35 +114,8 @@ def mixed_sensitivity(G: Block, W1: Block, W2: Block, decay_rate: float) -> Synt
     slowest = max(pole.real for pole in poles)
     if slowest > -decay_rate * (1 - 1e-3):
         raise SynthesisError(f"a closed-loop pole lies at Re s = {slowest:.6g}, right of {-decay_rate:.6g}")
-    lower, _ = _bisect(*(block.shifted(0.01 * decay_rate) for block in (G, W1, W2)))
+    lower, _ = _bisect(_assemble(*(block.shifted(0.01 * decay_rate) for block in (G, W1, W2))))
     return Synthesis(K, lower, closed_loop_norm(G, W1, W2, K), decay_rate, line_lower, line, poles)
-
-
-def closed_loop_norm(G: Block, W1: Block, W2: Block, K: Block) -> float:
-    """|| [W1 S; W2 T] ||_inf from the factors' frequency responses, independent of any state space."""
-    GK, W2G = G * K, W2 * G
-
-    def magnitude(omega: np.ndarray) -> np.ndarray:
-        s = 1j * omega
-        S = 1 / (1 + GK(s))
-        return np.hypot(np.abs(W1(s) * S), np.abs(W2G(s) * K(s) * S))
-
-    roots = GK.zeros + GK.poles + W1.poles + W2G.zeros + W2G.poles
-    return peak(magnitude, roots + closed_loop_poles(G, K))[0]
-
-
-def closed_loop_poles(G: Block, K: Block) -> tuple[complex, ...]:
-    """Roots in rad/s of 1 + G K, including what cancels between the factors (internal stability)."""
-    q = geometric_scale(G, K)
-    g, k = realize(G), realize(K)
-    # u = K e, e = -(C_g x_g + d_g u): with K strictly proper no algebraic loop
-    A = np.block(
-        [
-            [g.A, np.outer(g.b, k.C[0])],
-            [-np.outer(k.b, g.C[0]), k.A - g.d[0] * np.outer(k.b, k.C[0])],
-        ]
-    )
-    return tuple(complex(pole) for pole in eigvals(A / q) * q)
 
 
 def _check(G: Block, W1: Block, W2: Block, decay_rate: float) -> None:
@@ -183,9 +158,8 @@ def _assemble(G: Block, W1: Block, W2: Block) -> _GeneralisedPlant:
     )
 
 
-def _bisect(G: Block, W1: Block, W2: Block) -> tuple[float, Block]:
-    """Greatest gamma found infeasible (within TOLERANCE of the least feasible), and the controller above it."""
-    plant = _assemble(G, W1, W2)
+def _bisect(plant: _GeneralisedPlant) -> tuple[float, float]:
+    """Greatest gamma found infeasible and least found feasible, within TOLERANCE of each other."""
     high = 1.0
     while _central(plant, high) is None:
         high *= 4
@@ -202,10 +176,15 @@ def _bisect(G: Block, W1: Block, W2: Block) -> tuple[float, Block]:
             low = middle
         else:
             high = middle
-    controller = _central(plant, high * (1 + SUBOPTIMALITY))
+    return low, high
+
+
+def _controller(plant: _GeneralisedPlant, feasible: float, cancelling: tuple[complex, ...]) -> Block:
+    """The central controller SUBOPTIMALITY above a feasible gamma, without the poles that cancel."""
+    controller = _central(plant, feasible * (1 + SUBOPTIMALITY))
     if controller is None:
         raise SynthesisError("the feasibility of the mixed sensitivity problem is not monotonic in gamma")
-    return low, without(to_block(*controller, plant.q), W1.poles)
+    return without(to_block(*controller, plant.q), cancelling)
 
 
 def _central(plant: _GeneralisedPlant, gamma: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float] | None:

@@ -9,7 +9,7 @@ import click
 import numpy as np
 import pandas as pd
 
-from design.anti_windup import AntiWindup, second_order
+from design.anti_windup import AntiWindup, printed_form
 from design.contract import Design, read_design
 from experiments.additive_error import additive_error_tables
 from experiments.claims import read_ledger, recompute
@@ -21,6 +21,7 @@ from experiments.loops import design_loop
 from experiments.metrics import last_saturation
 from experiments.pid import pid_tables
 from experiments.scenarios import Reference, thesis_reference
+from experiments.tracking import compensators
 from identification.files import CommandGroup, InputError, write_whole
 from identification.frequency_response import read_sweep
 from identification.model import read_model
@@ -106,12 +107,9 @@ def _compensator(design: Design, name: str, numbers: Mapping[str, float | None])
     given = {key: value for key, value in numbers.items() if value is not None}
     if given and name != "thesis":
         raise InputError(f"--{next(iter(given))} belongs to --anti-windup thesis; found --anti-windup {name}")
-    if name == "none":
-        return None
-    if name == "corrected":
-        return design.corrected_anti_windup()
-    chosen = {key: float(design.anti_windup["thesis"][key]) for key in ("alpha", "beta", "gamma")} | given
-    return second_order(chosen["alpha"], chosen["beta"], chosen["gamma"])
+    if given:
+        return printed_form({**design.anti_windup["thesis"], **given})
+    return compensators(design)[name]
 
 
 @main.command("pid")

@@ -37,6 +37,6 @@ def delay_free_tables(design: Design, limit: float | None = None) -> dict[str, p
     runs = run_all(loops(design, reference), limit, time_s)
     required = reference.amplitude / abs(complex(design.loop_plant(1j * reference.omega)))
     return {
-        "delay_free": tracking_table(runs),
+        "delay_free": tracking_table(runs, reference),
         "delay_free_summary": tracking_summary(runs, limit, limit_is_given, reference, required),
     }

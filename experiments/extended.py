@@ -53,7 +53,7 @@ def extended_tables(design: Design, limit: float | None = None) -> dict[str, pd.
     every = exact | {f"{name}_pade": with_pade(exact[name], PADE_ORDER) for name in ("none", "thesis")}
     runs = run_all(every, limit, np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1))
     return {
-        "extended": tracking_table(runs),
+        "extended": tracking_table(runs, reference),
         "extended_summary": tracking_summary(runs, limit, limit_is_given, reference, required),
     }
 

@@ -59,10 +59,10 @@ def _run(loop: SaturatedLoop, limit: float, time_s: np.ndarray) -> Run:
         )
 
 
-def tracking_table(runs: Mapping[str, Run]) -> pd.DataFrame:
+def tracking_table(runs: Mapping[str, Run], reference: Reference) -> pd.DataFrame:
     """time_s, reference and, for every run NAME, output_NAME, error_NAME, control_NAME, saturated_NAME."""
-    first = max(runs.values(), key=lambda run: int(np.isfinite(run.control).sum()))
-    columns = {"time_s": first.time_s, "reference": first.outputs["reference"]}
+    time_s = next(iter(runs.values())).time_s
+    columns = {"time_s": time_s, "reference": reference(time_s)}
     for name, run in runs.items():
         columns[f"output_{name}"] = run.outputs["output"]
         columns[f"error_{name}"] = run.outputs["error"]

@@ -95,7 +95,7 @@ def test_json_round_trip_is_exact() -> None:
 
 
 def test_realisation_of_the_plant_is_accurate_where_it_is_tiny(implied: IdentifiedModel) -> None:
-    block = plant_block(implied.plant).without_delay()
+    block = plant_block(implied.plant.without_delay())
     np.testing.assert_allclose(response(realize(block), S)[:, 0], block(S), rtol=1e-9)
 
 

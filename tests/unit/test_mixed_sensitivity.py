@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from design.block import Block, bound_block
+from design.closed_loop import closed_loop_poles
 from design.contract import Design
 from design.frequency import peak
-from design.mixed_sensitivity import closed_loop_poles, mixed_sensitivity
+from design.mixed_sensitivity import mixed_sensitivity
 from design.realization import realize
 from identification.files import InputError
 
