@@ -74,7 +74,7 @@ def washout(bound: AdditiveBound, rate: float) -> AntiWindup:
 
     1 + theta1~ = s (s^2 + 2 zeta omega s + omega^2) / ((s + rate)(s + omega)^2),
 
-    omega and zeta being those of W_a: the zero at s = 0 takes the plant's integrator out of theta2, so that
+    omega and zeta being those of W_a's resonance: the zero at s = 0 takes the plant's integrator out of theta2, so that
     y_d dies away after the actuator has left saturation, and the notch cancels the resonance of the bound. A
     bound without resonance (zeta >= 1) has nothing to cancel: 1 + theta1~ = s/(s + rate).
     This is our choice within the class that theta1~(0) = -1 leaves; the thesis prints (2.23) only.
@@ -88,10 +88,10 @@ def washout(bound: AdditiveBound, rate: float) -> AntiWindup:
     """
     if not (np.isfinite(rate) and rate > 0):
         raise InputError(f"the recovery rate is {rate:g}; expected a positive number of 1/s")
-    omega, zeta = bound.omega, bound.zeta
+    omega, zeta = bound.resonance.omega, bound.resonance.zeta
     if zeta >= 1:
         return AntiWindup(Block(-rate, (), (complex(-rate),)), Block(1.0, (0j,), (complex(-rate),)))
-    notch = bound_block(bound).poles
+    notch = bound.resonance.roots
     poles = (complex(-rate), complex(-omega), complex(-omega))
     # numerator - denominator = -((rate + 2 (1 - zeta) omega) s^2 + 2 omega rate s + rate omega^2)
     leading = rate + 2 * (1 - zeta) * omega
@@ -119,7 +119,7 @@ def optimal_gamma(bound: AdditiveBound, alpha: float, beta: float) -> tuple[floa
         return uncertainty_cost(bound, second_order(alpha, beta, gamma).one_plus)[0]
 
     # Past twice the gamma that puts the zeros at W_a's peak, f grows with gamma.
-    upper = 4 * (1 + bound.omega**2 * alpha * beta)
+    upper = 4 * (1 + bound.resonance.omega**2 * alpha * beta)
     found = minimize_scalar(cost, bounds=(-1.0, upper), method="bounded", options={"xatol": 1e-8 * upper})
     return float(found.x), float(found.fun)
 

@@ -117,9 +117,12 @@ class Block:
             raise InputError(f"a block is not of the form gain, zeros, poles, delay_s ({error})") from None
 
 
-def mode_product(gain: float, modes: Iterable[Mode]) -> Block:
-    """gain * prod(1 + 2 zeta s/omega + (s/omega)^2) as a polynomial block."""
+def mode_product(gain: float, modes: Iterable[Mode], rates: Iterable[float] = ()) -> Block:
+    """gain * prod(1 + 2 zeta s/omega + (s/omega)^2) * prod(1 + s/rate) as a polynomial block."""
     roots: list[complex] = []
+    for rate in rates:
+        roots.append(complex(-rate))
+        gain /= rate
     for mode in modes:
         roots += mode.roots
         gain /= mode.omega**2
@@ -128,12 +131,33 @@ def mode_product(gain: float, modes: Iterable[Mode]) -> Block:
 
 def plant_numerator(plant: PlantModel) -> Block:
     """B(s) of Thesis Eq. (2.3), normalised as (2.20) is: B(0) = K."""
-    return mode_product(plant.gain, plant.zero_modes)
+    return mode_product(plant.gain, plant.zero_modes, plant.real_zeros)
 
 
 def plant_denominator(plant: PlantModel) -> Block:
-    """A(s) of Thesis Eq. (2.3), normalised as (2.20) is: A(s)/s -> 1 at s = 0."""
-    return Block(1.0, (0j,)) * mode_product(1.0, plant.pole_modes)
+    """A(s) of Thesis Eq. (2.3), normalised as (2.20) is: A(s)/s^integrators -> 1 at s = 0."""
+    return Block(1.0, (0j,) * plant.integrators) * mode_product(1.0, plant.pole_modes, plant.real_poles)
+
+
+def require_thesis_class(plant: PlantModel) -> None:
+    """Refuse a plant that is not an integrator times a biproper, stable and minimum phase G: the designs' class (2.20).
+
+    Raises
+    ------
+    InputError
+        There is not exactly one integrator, or beside it there are fewer zeros than poles.
+    """
+    if plant.integrators != 1:
+        raise InputError(f"the plant has {plant.integrators} integrators; the design expects exactly one, Eq. (2.20)")
+    zeros, poles = (
+        2 * len(modes) + len(rates)
+        for modes, rates in ((plant.zero_modes, plant.real_zeros), (plant.pole_modes, plant.real_poles))
+    )
+    if zeros != poles:
+        raise InputError(
+            f"beside its integrator the plant has {zeros} zeros and {poles} poles; the design expects equally many, "
+            "or its controller is improper"
+        )
 
 
 def plant_block(plant: PlantModel) -> Block:
@@ -143,9 +167,9 @@ def plant_block(plant: PlantModel) -> Block:
 
 
 def bound_block(bound: AdditiveBound) -> Block:
-    """W_a(s) of Thesis Eq. (2.22) as a block."""
-    resonance = mode_product(1.0, [Mode(bound.omega, bound.zeta)])
-    return Block(bound.gain / bound.corner, (-bound.corner + 0j,)) * resonance.inverse()
+    """W_a(s) of Thesis Eq. (2.22), of any order, as a block."""
+    zeros = mode_product(bound.gain, bound.zero_modes, bound.real_zeros)
+    return zeros * mode_product(1.0, bound.pole_modes, bound.real_poles).inverse()
 
 
 def polynomial(block: Block, scale: float = 1.0) -> np.ndarray:

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from design.anti_windup import AntiWindup, printed_form, washout
 from design.block import Block
 from identification.files import InputError
-from identification.model import bound_from_dict, member, number, plant_from_dict, plant_to_dict, read_json
+from identification.model import (
+    bound_from_dict,
+    bound_to_dict,
+    member,
+    number,
+    plant_from_dict,
+    plant_to_dict,
+    read_json,
+)
 from identification.plant import AdditiveBound, PlantModel
 
 SCHEMA = 1
@@ -73,7 +81,7 @@ class Design:
             "schema": SCHEMA,
             "kind": self.kind,
             "plant": plant_to_dict(self.plant),
-            "additive_bound": asdict(self.additive_bound),
+            "additive_bound": bound_to_dict(self.additive_bound),
             "reference_omega": self.reference_omega,
             "parameters": dict(self.parameters),
             "blocks": {name: block.to_dict() for name, block in self.blocks.items()},

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from design.anti_windup import compensators, printed_form
-from design.block import Block, bound_block, plant_denominator, plant_numerator
+from design.block import Block, bound_block, plant_denominator, plant_numerator, require_thesis_class
 from design.contract import Design
 from design.internal_model import internal_model, reference_polynomial
 from design.mixed_sensitivity import SynthesisError, mixed_sensitivity
@@ -57,11 +57,7 @@ def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -
     if not (math.isfinite(period_s) and period_s > 0):
         raise InputError(f"the period is {period_s:g} s; expected a positive number")
     plant = model.plant.without_delay()
-    if len(plant.zero_modes) != len(plant.pole_modes):
-        raise InputError(
-            f"the plant has {len(plant.zero_modes)} zero modes and {len(plant.pole_modes)} pole modes; "
-            "the delay-free design expects equally many"
-        )
+    require_thesis_class(plant)
     omega = 2 * math.pi / period_s
     units = internal_model(plant, omega, epsilon)
     A, B, W_a = plant_denominator(plant), plant_numerator(plant), bound_block(model.additive_bound)

@@ -78,7 +78,7 @@ def internal_model(plant: PlantModel, omega: float, epsilon: float) -> InternalM
         )
     A, B = plant_denominator(plant), plant_numerator(plant)
     fill = max(0, len(B.zeros) - 4)
-    fastest = max((mode.omega for mode in plant.zero_modes + plant.pole_modes), default=omega)
+    fastest = max((abs(root) for root in A.zeros + B.zeros if root != 0), default=omega)
     Lambda = reference_polynomial(omega, epsilon) * Block(1.0, (complex(-fastest),) * fill)
     q = geometric_scale(A, Lambda)
     difference = np.polysub(polynomial(Lambda, q), polynomial(A, q))

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from design.block import Block, from_polynomial, plant_denominator, plant_numerator
+from design.block import Block, from_polynomial, plant_denominator, plant_numerator, require_thesis_class
 from design.stable_interpolation import StableFunction
-from identification.files import InputError
 from identification.plant import Complex, PlantModel
 
 
@@ -58,13 +57,9 @@ def stabiliser(plant: PlantModel, T_so: Block) -> tuple[Block, Block, Block]:
     Raises
     ------
     InputError
-        The plant has more pole modes than zero modes, so that K_1 would be improper.
+        The plant is not of the class (2.20), so that K_1 would be improper.
     """
-    if len(plant.zero_modes) != len(plant.pole_modes):
-        raise InputError(
-            f"the plant has {len(plant.zero_modes)} zero modes and {len(plant.pole_modes)} pole modes; "
-            "expected equally many, or K_1 = 1/(K R_0) is improper"
-        )
+    require_thesis_class(plant)
     s = Block(1.0, (0j,))
     K_0 = s * T_so
     K_1 = plant_denominator(plant) * s.inverse() * plant_numerator(plant).inverse()

@@ -58,8 +58,8 @@ def bound_4_9(inputs: Inputs) -> dict[str, float]:
     return {
         "W_a.gain": bound.gain,
         "W_a.corner": bound.corner,
-        "W_a.two_zeta": 2 * bound.zeta,
-        "W_a.omega": bound.omega,
+        "W_a.two_zeta": 2 * bound.resonance.zeta,
+        "W_a.omega": bound.resonance.omega,
     }
 
 

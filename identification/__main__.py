@@ -109,10 +109,10 @@ def _table(result: FitResult, report: BoundReport) -> str:
             unit = 1.0 if label.startswith("delay") else abs(value)
             line += f"{result.scatter[k] * count**0.5 * unit:>13.3g}"
         lines.append(line)
-    bound = report.bound
+    bound, peak = report.bound, report.bound.resonance
     lines.append(
-        f"W_a = {bound.gain:.4g} (1 + s/{bound.corner:.4g}) / (1 + 2 {bound.zeta:.4g} s/{bound.omega:.4g} + "
-        f"(s/{bound.omega:.4g})^2), {report.mean_excess:.2f} times the residuals' envelope on average, "
+        f"W_a = {bound.gain:.4g} (1 + s/{bound.corner:.4g}) / (1 + 2 {peak.zeta:.4g} s/{peak.omega:.4g} + "
+        f"(s/{peak.omega:.4g})^2), {report.mean_excess:.2f} times the residuals' envelope on average, "
         f"{report.largest_excess:.2f} at most"
     )
     lines.append(f"{count} test{'s' if count > 1 else ''}, {result.modes} mode pairs")

@@ -43,7 +43,7 @@ class IdentifiedModel:
             "schema": SCHEMA,
             "plant": plant_to_dict(self.plant),
             "standard_errors": self.standard_errors,
-            "additive_bound": asdict(self.additive_bound),
+            "additive_bound": bound_to_dict(self.additive_bound),
             "fit": dict(self.fit),
         }
         return json.dumps(content, indent=2, allow_nan=False) + "\n"
@@ -56,11 +56,14 @@ def plant_to_dict(plant: PlantModel) -> dict[str, Any]:
         "zero_modes": [asdict(mode) for mode in plant.zero_modes],
         "pole_modes": [asdict(mode) for mode in plant.pole_modes],
         "delay_s": plant.delay_s,
+        "integrators": plant.integrators,
+        "real_zeros": list(plant.real_zeros),
+        "real_poles": list(plant.real_poles),
     }
 
 
 def plant_from_dict(content: Mapping[str, Any]) -> PlantModel:
-    """Read what :func:`plant_to_dict` writes (also the plants of thesis.toml).
+    """Read what :func:`plant_to_dict` writes (also the plants of thesis.toml, which leave out the last three members).
 
     Raises
     ------
@@ -72,12 +75,36 @@ def plant_from_dict(content: Mapping[str, Any]) -> PlantModel:
         zero_modes=_modes(content, "zero_modes"),
         pole_modes=_modes(content, "pole_modes"),
         delay_s=number(content, "delay_s"),
+        integrators=content.get("integrators", 1),
+        real_zeros=_numbers(content, "real_zeros"),
+        real_poles=_numbers(content, "real_poles"),
     )
 
 
+def bound_to_dict(bound: AdditiveBound) -> dict[str, Any]:
+    """The ``additive_bound`` object of model.json and design.json: gain, corner, omega, zeta where it is (2.22)."""
+    if bound.is_printed_form:
+        return {"gain": bound.gain, "corner": bound.corner, **asdict(bound.resonance)}
+    return {
+        "gain": bound.gain,
+        "zero_modes": [asdict(mode) for mode in bound.zero_modes],
+        "pole_modes": [asdict(mode) for mode in bound.pole_modes],
+        "real_zeros": list(bound.real_zeros),
+        "real_poles": list(bound.real_poles),
+    }
+
+
 def bound_from_dict(content: Mapping[str, Any]) -> AdditiveBound:
-    """Read the ``additive_bound`` object of model.json; raises InputError as :func:`plant_from_dict` does."""
-    return AdditiveBound(*(number(content, key) for key in ("gain", "corner", "omega", "zeta")))
+    """Read what :func:`bound_to_dict` writes; raises InputError as :func:`plant_from_dict` does."""
+    if "pole_modes" not in content:
+        return AdditiveBound.printed_form(*(number(content, key) for key in ("gain", "corner", "omega", "zeta")))
+    return AdditiveBound(
+        gain=number(content, "gain"),
+        zero_modes=_modes(content, "zero_modes"),
+        pole_modes=_modes(content, "pole_modes"),
+        real_zeros=_numbers(content, "real_zeros"),
+        real_poles=_numbers(content, "real_poles"),
+    )
 
 
 def read_model(name: str) -> IdentifiedModel:
@@ -155,6 +182,14 @@ def _modes(content: Mapping[str, Any], key: str) -> tuple[Mode, ...]:
     if not isinstance(modes, list) or not all(isinstance(mode, Mapping) for mode in modes):
         raise InputError(f"'{key}' is {modes!r}; expected a list of objects with 'omega' and 'zeta'")
     return tuple(Mode(omega=number(mode, "omega"), zeta=number(mode, "zeta")) for mode in modes)
+
+
+def _numbers(content: Mapping[str, Any], key: str) -> tuple[float, ...]:
+    """The list of numbers at ``key``; none where there is no such member."""
+    values = content.get(key, [])
+    if not isinstance(values, list):
+        raise InputError(f"'{key}' is {values!r}; expected a list of numbers")
+    return tuple(number({key: value}, key) for value in values)
 
 
 def _refuse_constant(name: str) -> float:

@@ -98,7 +98,7 @@ def bound_residuals(plant: PlantModel, tests: Sequence[FrequencyResponse]) -> Bo
     logs = lower + min(found, key=lambda result: float(result.fun)).x * (upper - lower)
     corner, resonance, zeta = (float(x) for x in np.exp(logs))
     gain = float(np.max(residual / _shape(logs, omega))) * (1 + MARGIN)
-    bound = AdditiveBound(gain, corner, resonance, zeta)
+    bound = AdditiveBound.printed_form(gain, corner, resonance, zeta)
     ratio = np.abs(bound(1j * omega)) / np.maximum(residual, np.finfo(float).tiny)
     if not np.all(ratio >= 1):
         raise RuntimeError(f"the additive bound misses a residual by a factor {1 / ratio.min():.3g}")

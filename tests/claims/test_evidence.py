@@ -130,7 +130,7 @@ def test_beta_is_the_best_of_a_coarse_grid_only(implied: IdentifiedModel):
 
 def test_gamma_97_puts_the_zeros_of_one_plus_theta1_on_the_peak_of_W_a(implied: IdentifiedModel):
     zero = second_order(1 / 20, 1 / 40, 97.0).one_plus.zeros[0]
-    assert abs(zero) == pytest.approx(implied.additive_bound.omega, rel=1e-12)
+    assert abs(zero) == pytest.approx(implied.additive_bound.resonance.omega, rel=1e-12)
 
 
 # theta2 and Theorem 2.3.1

@@ -35,7 +35,7 @@ def test_one_plus_theta1_is_exact_for_the_printed_form(alpha: float, beta: float
 @settings(max_examples=50, deadline=None)
 @given(positive, positive, st.floats(1e-3, 4.0), positive)
 def test_one_plus_theta1_is_exact_for_the_corrected_form(omega: float, corner: float, zeta: float, rate: float) -> None:
-    kind = washout(AdditiveBound(1.0, corner, omega, zeta), rate)
+    kind = washout(AdditiveBound.printed_form(1.0, corner, omega, zeta), rate)
     np.testing.assert_allclose(kind.one_plus(S), 1 + kind.theta1_tilde(S), rtol=1e-9, atol=1e-9)
     assert complex(kind.theta1_tilde(0j)) == pytest.approx(-1.0, abs=1e-12)
     assert kind.theta1_tilde.relative_degree >= 1
@@ -60,7 +60,7 @@ def test_the_printed_form_keeps_the_integrator_and_the_corrected_one_does_not(im
 
 def test_f_of_no_compensation_is_the_peak_of_a_second_order_bound() -> None:
     # |W_a| with its zero far away: gain/(2 zeta sqrt(1 - zeta^2)) at omega sqrt(1 - 2 zeta^2)
-    bound = AdditiveBound(0.3, 1e9, 50.0, 0.02)
+    bound = AdditiveBound.printed_form(0.3, 1e9, 50.0, 0.02)
     value, omega = uncertainty_cost(bound, Block(1.0))
     assert value == pytest.approx(0.3 / (2 * 0.02 * np.sqrt(1 - 0.02**2)), rel=1e-6)
     assert omega == pytest.approx(50.0 * np.sqrt(1 - 2 * 0.02**2), rel=1e-4)
@@ -80,7 +80,7 @@ def test_optimal_gamma_beats_brute_force(implied: IdentifiedModel, beta: float) 
 def test_thesis_choice_scales_with_the_bound(implied: IdentifiedModel) -> None:
     # time in other units: alpha and beta scale, gamma and f do not
     bound = implied.additive_bound
-    slow = AdditiveBound(bound.gain, bound.corner / 7, bound.omega / 7, bound.zeta)
+    slow = AdditiveBound.printed_form(bound.gain, bound.corner / 7, bound.resonance.omega / 7, bound.resonance.zeta)
     alpha, beta, gamma = thesis_choice(bound)
     np.testing.assert_allclose(thesis_choice(slow), (7 * alpha, 7 * beta, gamma), rtol=1e-5)
 

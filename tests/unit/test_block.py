@@ -20,7 +20,7 @@ from design.block import (
 from design.realization import StateSpace, realize
 from identification.files import InputError
 from identification.model import IdentifiedModel
-from identification.plant import Mode, PlantModel
+from identification.plant import Mode
 
 S = 1j * np.geomspace(1e-2, 1e4, 400) + 0.1
 
@@ -128,8 +128,3 @@ def test_realisation_of_random_blocks(poles: list[tuple[complex, ...]], data: st
     block = Block(1.7, zeros, flat)
     values, truth = response(realize(block), S)[:, 0], block(S)
     assert np.max(np.abs(values - truth)) <= 1e-9 * np.max(np.abs(truth))
-
-
-def test_plant_refuses_more_zero_than_pole_modes() -> None:
-    with pytest.raises(InputError, match="no more zero modes"):
-        PlantModel(1.0, (Mode(1.0, 0.1),), (), 0.0)

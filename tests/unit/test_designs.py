@@ -40,7 +40,7 @@ OTHERS = {
 
 def other_model(name: str, implied: IdentifiedModel) -> IdentifiedModel:
     plant = OTHERS[name]
-    bound = AdditiveBound(0.0015 * abs(plant.gain), 20.0, 280.0, 0.01)
+    bound = AdditiveBound.printed_form(0.0015 * abs(plant.gain), 20.0, 280.0, 0.01)
     return dataclasses.replace(implied, plant=plant, additive_bound=bound)
 
 
@@ -91,12 +91,22 @@ def test_delay_free_design_of_other_plants(implied: IdentifiedModel, name: str, 
     assert design.hinf["gamma_line"] <= 1.021 * design.hinf["gamma_line_lower"]
 
 
-def test_unequal_modes_are_refused(implied: IdentifiedModel) -> None:
-    lame = dataclasses.replace(implied, plant=PlantModel(1.0, (), (Mode(10.0, 0.1),), 0.01))
-    with pytest.raises(InputError, match="equally many"):
-        design_delay_free(lame, 4.0, 1e-4)
-    with pytest.raises(InputError, match="improper"):
-        design_extended(lame, 1.5, 4.0, 2.0, 1.0)
+@pytest.mark.parametrize(
+    ("plant", "sentence"),
+    [
+        (PlantModel(1.0, (), (Mode(10.0, 0.1),), 0.01), "0 zeros and 2 poles; .* equally many"),
+        (PlantModel(1.0, (), (), 0.01, real_poles=(3.0,)), "0 zeros and 1 poles; .* equally many"),
+        (PlantModel(1.0, (), (), 0.01, integrators=0), "has 0 integrators"),
+        (PlantModel(1.0, (), (), 0.01, integrators=2), "has 2 integrators"),
+    ],
+    ids=["two poles more", "one pole more", "no integrator", "two integrators"],
+)
+def test_plants_of_another_class_are_refused(implied: IdentifiedModel, plant: PlantModel, sentence: str) -> None:
+    other = dataclasses.replace(implied, plant=plant)
+    with pytest.raises(InputError, match=sentence):
+        design_delay_free(other, 4.0, 1e-4)
+    with pytest.raises(InputError, match=sentence):
+        design_extended(other, 1.5, 4.0, 2.0, 1.0)
 
 
 # chapters 3 and 4

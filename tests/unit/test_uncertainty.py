@@ -11,8 +11,8 @@ from identification.plant import AdditiveBound, Mode, PlantModel
 from identification.uncertainty import bound_residuals
 
 PLANT = PlantModel(7.0, (Mode(40.0, 0.01),), (Mode(65.0, 0.02),), 8e-3)
-RESONANT = AdditiveBound(0.01, 20.0, 70.0, 0.02)
-FLAT = AdditiveBound(0.01, 8.0, 50.0, 0.9)
+RESONANT = AdditiveBound.printed_form(0.01, 20.0, 70.0, 0.02)
+FLAT = AdditiveBound.printed_form(0.01, 8.0, 50.0, 0.9)
 
 
 def _tests(bound: AdditiveBound, scale: float = 1.0, count: int = 3) -> list[FrequencyResponse]:
@@ -55,8 +55,8 @@ def test_is_no_looser_than_the_bound_behind_the_residuals(bound: AdditiveBound) 
 
 def test_finds_the_resonance() -> None:
     report = bound_residuals(PLANT, _tests(RESONANT))
-    assert report.bound.omega == pytest.approx(70.0, rel=0.01)
-    assert report.bound.zeta == pytest.approx(0.02, rel=0.3)
+    assert report.bound.resonance.omega == pytest.approx(70.0, rel=0.01)
+    assert report.bound.resonance.zeta == pytest.approx(0.02, rel=0.3)
 
 
 def test_units_do_not_matter() -> None:

@@ -1,0 +1,71 @@
+"""The plant and the bound: each factor against its formula, the JSON they are kept in, and what is refused."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from design.block import bound_block, plant_block
+from identification.files import InputError
+from identification.model import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
+from identification.plant import AdditiveBound, Mode, PlantModel
+
+S = 1j * np.geomspace(0.1, 100, 50)
+PLANT = PlantModel(
+    -3.0, (Mode(2.0, 0.1),), (Mode(5.0, 1.5),), 0.02, integrators=2, real_zeros=(7.0,), real_poles=(0.5,)
+)
+
+
+def test_every_factor() -> None:
+    zeros = (1 + 0.1 * S + (S / 2) ** 2) * (1 + S / 7)
+    poles = S**2 * (1 + 0.6 * S + (S / 5) ** 2) * (1 + S / 0.5)
+    np.testing.assert_allclose(PLANT(S), -3 * zeros / poles * np.exp(-0.02 * S), rtol=1e-13)
+    np.testing.assert_allclose(plant_block(PLANT)(S), PLANT(S), rtol=1e-12)
+    assert PLANT.relative_degree == 2
+
+
+def test_the_printed_form_of_the_bound() -> None:
+    bound = AdditiveBound.printed_form(0.3, 20.0, 70.0, 0.02)
+    np.testing.assert_allclose(bound(S), 0.3 * (1 + S / 20) / (1 + 0.04 * S / 70 + (S / 70) ** 2), rtol=1e-13)
+    assert (bound.order, bound.corner, bound.resonance) == (2, 20.0, Mode(70.0, 0.02))
+
+
+def test_a_bound_of_order_three() -> None:
+    bound = AdditiveBound(0.3, (Mode(4.0, 0.2),), (Mode(9.0, 0.1),), (), (30.0,))
+    value = 0.3 * (1 + 0.1 * S + (S / 4) ** 2) / (1 + 0.2 * S / 9 + (S / 9) ** 2) / (1 + S / 30)
+    np.testing.assert_allclose(bound(S), value, rtol=1e-13)
+    np.testing.assert_allclose(bound_block(bound)(S), value, rtol=1e-12)
+    assert (bound.order, bound.corner, bound.resonance) == (3, 4.0, Mode(9.0, 0.1))
+
+
+def test_json_there_and_back() -> None:
+    for bound in (AdditiveBound.printed_form(1.0, 2.0, 3.0, 0.1), AdditiveBound(1.0, (), (), (), (4.0,))):
+        assert bound_from_dict(json.loads(json.dumps(bound_to_dict(bound)))) == bound
+    assert plant_from_dict(json.loads(json.dumps(plant_to_dict(PLANT)))) == PLANT
+    older = {key: plant_to_dict(PLANT)[key] for key in ("gain", "zero_modes", "delay_s")}
+    older["pole_modes"] = [{"omega": 5.0, "zeta": 1.5}]
+    assert plant_from_dict(older) == PlantModel(-3.0, (Mode(2.0, 0.1),), (Mode(5.0, 1.5),), 0.02)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"integrators": 3}, "integrators is 3; expected 0, 1 or 2"),
+        ({"integrators": True}, "integrators is True"),
+        ({"real_zeros": 3.0}, "'real_zeros' is 3.0; expected a list of numbers"),
+        ({"real_poles": [-1.0]}, "real_poles is -1; expected a positive number"),
+        ({"real_poles": ["2"]}, "'real_poles' is '2'; expected a number"),
+        ({"integrators": 0, "pole_modes": []}, "3 zeros and 1 poles; expected no more zeros than poles"),
+        ({"gain": 0}, "gain is 0"),
+    ],
+)
+def test_what_is_no_plant(change: dict[str, object], sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        plant_from_dict(plant_to_dict(PLANT) | change)
+
+
+def test_a_bound_needs_a_pole() -> None:
+    with pytest.raises(InputError, match="expected one pole or more"):
+        AdditiveBound(1.0, (), ())
