@@ -5,18 +5,23 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 MAKEFLAGS += --no-builtin-rules
+# The matrices are small: threads of the matrix library cost more than they bring, and change the last digits.
+export OPENBLAS_NUM_THREADS := 1
 
 PYTHON ?= python3
 BUILD ?= build
 MODEL ?=
 SWEEPS ?= $(sort $(wildcard data/elevation/*_frf.csv))
+FIT ?=
 OUT ?= build/refit
 LIMIT ?=
+REFIT :=
 
 PY := .venv/bin/python
 READY := .venv/.ready
 RESULTS := $(BUILD)/results
 FIGURES := $(BUILD)/figures
+SUMMARY := $(addprefix $(BUILD)/summary.,pdf svg png txt)
 THESIS := data/thesis/thesis.toml
 
 # The model that everything downstream is for: the one fitted from SWEEPS, unless MODEL names another.
@@ -25,14 +30,22 @@ CHOSEN := $(if $(MODEL),$(MODEL),$(FITTED))
 CHOICE := $(BUILD)/choice.txt
 MODEL_FILE := $(filter-out table implied,$(CHOSEN))
 
+# A folder among the sweeps stands for the files in it. find looks at them and not make: their names may be anything.
+FOLDERS := $(foreach sweep,$(SWEEPS),$(if $(wildcard $(sweep)/.),$(sweep)))
+SWEEP_FILES := $(filter-out $(FOLDERS),$(SWEEPS))
+IN_FOLDERS := $(if $(FOLDERS),find -L $(FOLDERS) -maxdepth 1 -type f \
+	\( -iname '*.csv' -o -iname '*.mat' -o -iname '*.uff' -o -iname '*.unv' -o -iname '*.58' \),:)
+
 LIMITS := $(if $(LIMIT),--limit $(LIMIT))
 
 NAMES := $(sort $(basename $(notdir $(wildcard paper_figures/fig_*.py))))
 DATA_NAMES := fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14 fig_4_01 fig_4_02 fig_4_03 fig_4_04
 FORMATS := pdf svg png txt
+DESIGNS := $(addprefix $(BUILD)/,design_delay_free.json design_extended.json)
+TABLES := additive_error f_gamma delay_free extended
 
+IDENTIFICATION := $(wildcard identification/*.py)
 CONTRACT := $(addprefix identification/,files.py plant.py model.py thesis.py) $(THESIS)
-READING := $(addprefix identification/,frequency_response.py sweep.py)
 ENGINE := $(addprefix experiments/,__main__.py closed_loop.py taylor.py crossings.py loops.py scenarios.py metrics.py)
 TRACKING := $(ENGINE) $(addprefix experiments/,tracking.py pade.py)
 
@@ -41,13 +54,15 @@ help: ## say what there is
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 	@echo
 	@echo 'make figures MODEL=implied    redraw for the thesis'"'"'s own set (or table, or a model.json)'
-	@echo 'make refit SWEEPS="a.csv b.csv" OUT=mine    from your own sweep files to the figures of your plant'
+	@echo 'make refit SWEEPS="a.csv b.mat folder" OUT=mine    from your own sweeps to mine/summary.pdf and mine/figures'
+	@echo 'make refit ... FIT="--modes 1 --bound-order 3"    with options of python -m identification fit'
 	@echo 'make refit ... LIMIT=5    under other saturation limits than the thesis'"'"'s'
 
 figures: $(foreach format,$(FORMATS),$(NAMES:%=$(FIGURES)/%.$(format))) ## draw every figure of the thesis into build/figures
 
-refit: ## fit SWEEPS="a.csv b.csv", design, simulate and draw for that plant into OUT
-	+@$(MAKE) --no-print-directory BUILD='$(OUT)' MODEL= SWEEPS='$(SWEEPS)' NAMES='$(DATA_NAMES)' figures
+refit: ## fit SWEEPS="a.csv b.csv", design, simulate, draw and sum up for that plant into OUT
+	+@$(MAKE) --no-print-directory REFIT=yes BUILD='$(OUT)' MODEL= SWEEPS='$(SWEEPS)' NAMES='$(DATA_NAMES)' \
+		figures '$(OUT)/summary.pdf'
 
 claims: $(BUILD)/claims.txt ## recompute the numbers that the thesis prints and say which agree
 	@cat $<
@@ -82,47 +97,62 @@ MISSING := $(filter-out $(FITTED) $(wildcard $(SWEEPS) $(MODEL_FILE)),$(SWEEPS) 
 $(if $(MISSING),$(error $(MISSING): no such file; expected sweep files in SWEEPS, or table, implied or a model.json in MODEL))
 $(if $(SWEEPS),,$(error SWEEPS is empty; expected one or more sweep files))
 ifeq (,$(findstring n,$(filter-out -%,$(firstword $(MAKEFLAGS)))))
-$(shell mkdir -p $(RESULTS) $(FIGURES); printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' '$(LIMIT)' | cmp -s - $(CHOICE) || \
-	printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' '$(LIMIT)' > $(CHOICE))
+$(shell mkdir -p $(RESULTS) $(FIGURES); \
+	asked() { printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' '$(FIT)' '$(LIMIT)'; $(IN_FOLDERS) | sort; }; \
+	asked | cmp -s - $(CHOICE) && [ -z "$$($(IN_FOLDERS)$(if $(FOLDERS), -newer $(CHOICE)))" ] || asked > $(CHOICE))
 endif
 endif
 
-$(FITTED): $(SWEEPS) $(wildcard identification/*.py) $(if $(MODEL),,$(CHOICE)) | $(READY)
-	$(PY) -m identification fit $(SWEEPS) --output $@
+$(CHOICE): ;
+
+# $(call attempt,COMMAND,FILES,INPUTS[,NAME]): run COMMAND, which writes FILES. In `make refit` nothing of other sweeps
+# stays, nothing is done if one of INPUTS was refused, and if COMMAND refuses (exit status 2), NAME.refused.txt keeps
+# its sentence for the summary.
+attempt = $(if $(REFIT),@rm -f $(2) $(4:%=%.refused.txt); for input in $(3); do [ -e $$input ] || exit 0; done; echo '$(1)'; \
+	$(if $(4),$(call keeping,$(1),$(4:%=%.refused.txt)),$(1)),$(1))
+keeping = if $(1) 2> $(2); then cat $(2) >&2; rm $(2); elif [ $$? != 2 ]; then cat $(2) >&2; exit 1; fi
+tables = $(addprefix $(RESULTS)/$(1),.csv _summary.csv)
+drawing = $(foreach format,$(FORMATS),$(1:%=$(FIGURES)/%.$(format)))
+
+$(FITTED): $(SWEEP_FILES) $(IDENTIFICATION) $(if $(MODEL),,$(CHOICE)) | $(READY)
+	$(if $(REFIT),@rm -f $@ $(SUMMARY) $(call drawing,$(NAMES)) $(BUILD)/design_* $(TABLES:%=$(RESULTS)/%*))
+	$(PY) -m identification fit $(SWEEPS) $(FIT) --output $@
 
 # Chapter 2 and chapters 3 and 4, with the thesis's references and free parameters.
 $(BUILD)/design_delay_free.json: $(MODEL_FILE) $(CHOICE) $(wildcard design/*.py) $(CONTRACT) | $(READY)
-	$(PY) -m design delay-free $(CHOSEN) --period 4 --output $@
+	$(call attempt,$(PY) -m design delay-free $(CHOSEN) --period 4 --output $@,$@,,$(basename $@))
 
 $(BUILD)/design_extended.json: $(MODEL_FILE) $(CHOICE) $(wildcard design/*.py) $(CONTRACT) | $(READY)
-	$(PY) -m design extended $(CHOSEN) --reference-omega 1.5 --a 4 --e 2 --f 1 --output $@
+	$(call attempt,$(PY) -m design extended $(CHOSEN) --reference-omega 1.5 --a 4 --e 2 --f 1 --output $@,$@,,\
+		$(basename $@))
 
-$(RESULTS)/pid.csv $(RESULTS)/pid_summary.csv &: experiments/pid.py $(ENGINE) $(THESIS) | $(READY)
+$(call tables,pid) &: experiments/pid.py $(ENGINE) $(THESIS) | $(READY)
 	$(PY) -m experiments pid --output $(RESULTS)
 
-$(RESULTS)/additive_error.csv $(RESULTS)/additive_error_summary.csv &: \
-		$(MODEL_FILE) $(CHOICE) $(SWEEPS) experiments/additive_error.py $(READING) $(CONTRACT) | $(READY)
+$(call tables,additive_error) &: \
+		$(MODEL_FILE) $(CHOICE) $(SWEEP_FILES) experiments/additive_error.py $(IDENTIFICATION) $(THESIS) | $(READY)
 	$(PY) -m experiments additive-error $(CHOSEN) $(SWEEPS) --output $(RESULTS)
 
-$(RESULTS)/f_gamma.csv $(RESULTS)/f_gamma_summary.csv &: $(BUILD)/design_extended.json experiments/f_gamma.py | $(READY)
-	$(PY) -m experiments f-gamma $< --output $(RESULTS)
+$(call tables,f_gamma) &: $(BUILD)/design_extended.json experiments/f_gamma.py | $(READY)
+	$(call attempt,$(PY) -m experiments f-gamma $< --output $(RESULTS),$(call tables,f_gamma),$<,\
+		$(RESULTS)/f_gamma)
 
-$(RESULTS)/delay_free.csv $(RESULTS)/delay_free_summary.csv &: \
+$(call tables,delay_free) &: \
 		$(BUILD)/design_delay_free.json experiments/delay_free.py $(TRACKING) | $(READY)
-	$(PY) -m experiments delay-free $< $(LIMITS) --output $(RESULTS)
+	$(call attempt,$(PY) -m experiments delay-free $< $(LIMITS) --output $(RESULTS),$(call tables,delay_free),$<,\
+		$(RESULTS)/delay_free)
 
-$(RESULTS)/extended.csv $(RESULTS)/extended_summary.csv &: \
+$(call tables,extended) &: \
 		$(BUILD)/design_extended.json experiments/extended.py $(TRACKING) | $(READY)
-	$(PY) -m experiments extended $< $(LIMITS) --output $(RESULTS)
+	$(call attempt,$(PY) -m experiments extended $< $(LIMITS) --output $(RESULTS),$(call tables,extended),$<,\
+		$(RESULTS)/extended)
 
 $(BUILD)/claims.csv $(BUILD)/claims.txt &: data/thesis/claims.csv $(wildcard experiments/*.py design/*.py) $(CONTRACT) | $(READY)
 	@mkdir -p $(BUILD)
 	$(PY) -m experiments claims --output $(BUILD) > $(BUILD)/claims.txt
 
-drawing = $(foreach format,$(FORMATS),$(1:%=$(FIGURES)/%.$(format)))
-
 define feeds
-$(call drawing,$(2)): $(1:%=$(RESULTS)/%.csv) $(1:%=$(RESULTS)/%_summary.csv)
+$(call drawing,$(2)): $(call tables,$(1))
 endef
 $(eval $(call feeds,pid,fig_2_02 fig_2_03 fig_2_04))
 $(eval $(call feeds,additive_error,fig_2_09))
@@ -140,4 +170,9 @@ $(call drawing,$(DIAGRAMS)): paper_figures/block_diagrams.py
 
 STYLE := paper_figures/__main__.py paper_figures/style.py paper_figures/thesis.mplstyle
 $(foreach format,$(FORMATS),$(FIGURES)/%.$(format)): paper_figures/%.py $(STYLE) | $(READY)
-	$(PY) -m paper_figures draw $* --results $(RESULTS) --output $(FIGURES)
+	$(call attempt,$(PY) -m paper_figures draw $* --results $(RESULTS) --output $(FIGURES),$(call drawing,$*),\
+		$(filter $(RESULTS)/%,$^))
+
+$(SUMMARY) &: $(FITTED) $(CHOICE) $(SWEEP_FILES) $(DESIGNS) $(foreach table,$(TABLES),$(call tables,$(table))) \
+		$(wildcard paper_figures/summary*.py) $(addprefix paper_figures/,panels.py captions.py) $(STYLE) | $(READY)
+	$(PY) -m paper_figures summary $(FITTED) $(SWEEPS) --build $(BUILD)

@@ -8,14 +8,15 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from identification.fit import fit_plant
-from identification.frequency_response import read_sweep
-from identification.likelihood import response_of
+from identification.frequency_response import read_sweeps
+from identification.least_squares import response_of
 from identification.model import read_model
+from identification.structure import Structure, Wanted
 from identification.thesis import DATA
 
 
 def test_against_scipy_from_the_answer(against: Callable[..., object]) -> None:
-    test = read_sweep(min((DATA / "elevation").glob("*_frf.csv")))
+    test = read_sweeps([min((DATA / "elevation").glob("*_frf.csv"))])[0]
     plant = read_model("implied").plant
     start = np.array(
         [
@@ -24,9 +25,10 @@ def test_against_scipy_from_the_answer(against: Callable[..., object]) -> None:
             plant.delay_s,
         ]
     )
+    structure = Structure(1, 4, 4)
     sigma = 0.01 * np.abs(test.response)
 
     def residual(theta: np.ndarray) -> np.ndarray:
-        return ((response_of(theta, test.omega) - test.response) / sigma).view(float)
+        return ((response_of(structure, theta, test.omega) - test.response) / sigma).view(float)
 
-    against(lambda: fit_plant([test], modes=2), lambda: least_squares(residual, start, x_scale="jac"))
+    against(lambda: fit_plant([test], Wanted(1, (2, 2), (0, 0))), lambda: least_squares(residual, start, x_scale="jac"))

@@ -23,7 +23,7 @@ from experiments.pid import pid_tables
 from experiments.scenarios import Reference, thesis_reference
 from experiments.tracking import compensators
 from identification.files import CommandGroup, InputError, write_whole
-from identification.frequency_response import read_sweep
+from identification.frequency_response import read_sweeps
 from identification.model import read_model
 
 OUTPUT_FOLDER = click.option(
@@ -147,11 +147,11 @@ def extended(design: Path, limit: float | None, output: Path) -> None:
 
 @main.command("additive-error")
 @click.argument("model")
-@click.argument("sweeps", nargs=-1, required=True, type=click.Path(path_type=Path, dir_okay=False))
+@click.argument("sweeps", nargs=-1, required=True, type=click.Path(path_type=Path))
 @OUTPUT_FOLDER
 def additive_error(model: str, sweeps: tuple[Path, ...], output: Path) -> None:
     """The additive error of SWEEPS against MODEL: additive_error.csv, additive_error_summary.csv."""
-    _write(output, additive_error_tables(read_model(model), [read_sweep(path) for path in sweeps]))
+    _write(output, additive_error_tables(read_model(model), read_sweeps(sweeps)))
 
 
 @main.command("claims")

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from identification.discretised import alias_free
 from identification.frequency_response import FrequencyResponse
 from identification.model import IdentifiedModel
 
 
 def additive_error_tables(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> dict[str, pd.DataFrame]:
-    """|P - P_test| and |W_a| at every line of every test, Thesis Eq. (2.21).
+    """|P - P_test| and |W_a| at every line of every test, Thesis Eq. (2.21), without the aliases of a held input.
 
     Returns
     -------
@@ -29,7 +30,7 @@ def additive_error_tables(model: IdentifiedModel, tests: Sequence[FrequencyRespo
                 {
                     "test": number,
                     "omega": test.omega,
-                    "error": np.abs(nominal - test.response),
+                    "error": np.abs(nominal - alias_free(test, model.plant).response),
                     "bound": np.abs(model.additive_bound(s)),
                     "plant": np.abs(nominal),
                 }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,31 +9,36 @@ import click
 import matplotlib.style
 from tqdm import tqdm
 
+from identification.discretised import alias_free
 from identification.files import CommandGroup, InputError, write_whole
-from identification.fit import FitResult, fit_plant, fit_to_dict
-from identification.frequency_response import FrequencyResponse, read_sweep
+from identification.fit import fit_plant
+from identification.frequency_response import FrequencyResponse, input_files, read_sweeps
 from identification.model import IdentifiedModel
+from identification.plant import PlantModel
 from identification.plot import draw_fit
-from identification.uncertainty import BoundReport, bound_residuals
+from identification.report import bound_remarks, bound_text, check_lines, facts, standard_errors, table
+from identification.structure import Wanted
+from identification.subspace import SubspaceCheck, check_modes
+from identification.uncertainty import HIGHEST_ORDER, bound_residuals
 
 FIGURES = (".pdf", ".svg", ".png")
 
 
-class ModesParam(click.ParamType):
-    """``auto`` (None) or a number of mode pairs from 0 to 8."""
+class Counts(click.ParamType):
+    """``auto`` (None), a number of zeros and of poles such as 1/2, or one number for both."""
 
-    name = "modes"
+    name = "counts"
 
-    def convert(self, value: str | None, param: click.Parameter | None, ctx: click.Context | None) -> int | None:
-        if value is None or value == "auto":
+    def __init__(self, most: int) -> None:
+        self.most = most
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int] | None:
+        if value == "auto":
             return None
-        if value not in map(str, range(9)):
-            self.fail(
-                f"'{value}' is not a number of mode pairs; expected auto or an integer from 0 to 8",
-                param,
-                ctx,
-            )
-        return int(value)
+        words = value.split("/") if "/" in value else [value, value]
+        if len(words) != 2 or not all(word in map(str, range(self.most + 1)) for word in words):
+            self.fail(f"'{value}' is no count; expected auto, N or ZEROS/POLES from 0 to {self.most}", param, ctx)
+        return int(words[0]), int(words[1])
 
 
 @click.group(cls=CommandGroup)
@@ -45,78 +49,80 @@ def main() -> None:
 @main.command()
 @click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--output", required=True, type=click.Path(path_type=Path), help="The model.json to write.")
-@click.option("--modes", default="auto", type=ModesParam(), metavar="auto|N", help="Mode pairs.  [default: auto]")
+@click.option(
+    "--modes", default="auto", type=Counts(8), metavar="auto|N|Z/P", help="Zero and pole modes.  [default: auto]"
+)
+@click.option(
+    "--real", default="auto", type=Counts(1), metavar="auto|N|Z/P", help="Real zeros and poles.  [default: auto]"
+)
+@click.option(
+    "--integrators",
+    default="auto",
+    type=click.Choice(["auto", "0", "1", "2"]),
+    show_default=True,
+    help="Poles at s = 0.",
+)
+@click.option(
+    "--loss",
+    default="least-squares",
+    type=click.Choice(["least-squares", "soft-l1"]),
+    show_default=True,
+    help="soft-l1: outliers can hardly move the fit.",
+)
+@click.option(
+    "--bound-order",
+    default=2,
+    type=click.IntRange(1, HIGHEST_ORDER),
+    show_default=True,
+    help="Of W_a; 2 is Eq. (2.22).",
+)
 @click.option("--seed", default=0, type=click.IntRange(min=0), show_default=True, help="Of the random restarts.")
 @click.option("--figure", type=click.Path(path_type=Path), help="Draw the fit; .pdf, .svg or .png.")
-def fit(sweeps: tuple[Path, ...], output: Path, modes: int | None, seed: int, figure: Path | None) -> None:
-    """Fit gain, integrator, modes and dead time to SWEEP files (raw records or frequency responses)."""
+def fit(
+    sweeps: tuple[Path, ...],
+    output: Path,
+    modes: tuple[int, int] | None,
+    real: tuple[int, int] | None,
+    integrators: str,
+    loss: str,
+    bound_order: int,
+    seed: int,
+    figure: Path | None,
+) -> None:
+    """Fit gain, integrators, modes, real roots and dead time to SWEEP files (raw records or frequency responses)."""
     if figure is not None and figure.suffix not in FIGURES:
         raise InputError(f"{figure}: the suffix is '{figure.suffix}'; expected {', '.join(FIGURES)}")
     if figure == output:
         raise InputError(f"{figure}: given as --output and as --figure; expected two files")
-    tests = [read_sweep(path) for path in sweeps]
+    tests = read_sweeps(sweeps)
     with tqdm(desc="fits", unit="", disable=None, leave=False) as bar:
-        result = fit_plant(tests, modes, seed, bar.update)
-    report = bound_residuals(result.plant, tests)
-    model = IdentifiedModel(result.plant, report.bound, result.standard_errors, _facts(sweeps, tests, result, report))
+        wanted = Wanted(None if integrators == "auto" else int(integrators), modes, real)
+        result = fit_plant(tests, wanted, soft=loss == "soft-l1", seed=seed, tick=bar.update)
+        checks = _checks(tests, [test.plant for test in result.tests], bar.update)
+    clean = [alias_free(test, result.plant) for test in tests]
+    report = bound_residuals(result.plant, clean, [test.plant for test in result.tests], bound_order)
+    model = IdentifiedModel(result.plant, report.bound, standard_errors(result), facts(tests, result, report, checks))
     text = model.to_json()
     writers: dict[Path, Callable[[Path], object]] = {output: lambda path: path.write_text(text, encoding="utf-8")}
     with matplotlib.style.context(["default", {"svg.hashsalt": "identification", "font.size": 9}]):
         if figure is not None:
-            drawing = draw_fit(tests, result.plant, report.bound)
+            drawing = draw_fit(clean, result.plant, report.bound)
             dateless = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}, ".png": {}}[figure.suffix]
             writers[figure] = lambda path: drawing.savefig(path, dpi=300, metadata=dateless)
-        write_whole(writers, inputs=sweeps)
-    click.echo(_table(result, report))
+        write_whole(writers, inputs=input_files(sweeps))
+    click.echo("\n".join([table(result), bound_text(report.bound), *bound_remarks(report), *check_lines(checks)]))
 
 
-def _facts(
-    sweeps: tuple[Path, ...], tests: list[FrequencyResponse], result: FitResult, report: BoundReport
-) -> dict[str, object]:
-    facts = fit_to_dict(result)
-    for entry, path, test in zip(facts["tests"], sweeps, tests, strict=True):
-        entry["sha256"] = hashlib.sha256(path.read_bytes()).hexdigest()
-        entry["synthetic"] = test.synthetic
-    return {
-        "source": "identification fit",
-        "synthetic": any(test.synthetic for test in tests),
-        **facts,
-        "bound": {
-            "largest_excess": report.largest_excess,
-            "mean_excess": report.mean_excess,
-            "touches_omega": report.touches_omega,
-            "touches_test": report.touches_test,
-        },
-    }
-
-
-def _table(result: FitResult, report: BoundReport) -> str:
-    """Parameter, estimate, standard error and, for several tests, the scatter of one test."""
-    plant, errors = result.plant, result.standard_errors
-    rows = [("gain", plant.gain, errors["gain"])]
-    for key, modes in (("zero_modes", plant.zero_modes), ("pole_modes", plant.pole_modes)):
-        for i, mode in enumerate(modes):
-            label = f"{key.removesuffix('_modes')} mode {i + 1}"
-            rows.append((f"{label}, omega [rad/s]", mode.omega, errors[key][i]["omega"]))
-            rows.append((f"{label}, zeta", mode.zeta, errors[key][i]["zeta"]))
-    rows.append(("delay [s]", plant.delay_s, errors["delay_s"]))
-    count = len(result.tests)
-    head = f"{'parameter':<28}{'estimate':>13}{'std. error':>13}" + (f"{'scatter':>13}" if count > 1 else "")
-    lines = [head]
-    for k, (label, value, error) in enumerate(rows):
-        line = f"{label:<28}{value:>13.6g}{error:>13.3g}"
-        if result.scatter is not None:
-            unit = 1.0 if label.startswith("delay") else abs(value)
-            line += f"{result.scatter[k] * count**0.5 * unit:>13.3g}"
-        lines.append(line)
-    bound, peak = report.bound, report.bound.resonance
-    lines.append(
-        f"W_a = {bound.gain:.4g} (1 + s/{bound.corner:.4g}) / (1 + 2 {peak.zeta:.4g} s/{peak.omega:.4g} + "
-        f"(s/{peak.omega:.4g})^2), {report.mean_excess:.2f} times the residuals' envelope on average, "
-        f"{report.largest_excess:.2f} at most"
-    )
-    lines.append(f"{count} test{'s' if count > 1 else ''}, {result.modes} mode pairs")
-    return "\n".join(lines)
+def _checks(
+    tests: list[FrequencyResponse], plants: list[PlantModel], tick: Callable[[], object]
+) -> dict[str, SubspaceCheck]:
+    """By its name, the subspace check of each test that was read from a raw record against its own fit."""
+    checks = {}
+    for test, plant in zip(tests, plants, strict=True):
+        if test.record is not None:
+            checks[test.name] = check_modes(plant, test.record, (float(test.omega[0]), float(test.omega[-1])))
+            tick()
+    return checks
 
 
 if __name__ == "__main__":

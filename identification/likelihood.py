@@ -2,39 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.discretised import aliases
+from identification.least_squares import least_squares, response_of
 from identification.start import BAND, BOUNDS
+from identification.structure import Structure
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 ALTERNATIONS = 4
-EVALUATIONS = 60
+ALIAS_TURNS = 12  # aliases change with the parameters, less at every turn
 RATIOS = 20.0  # of floor and relative error at the median response: logarithm of the largest
 GAIN = 20.0  # the gain is sought up to this factor's logarithm from the one that fits the guess
 CLOSEST = 1e-8  # no relative error below this is believed: files do not carry more digits
+NEWTON = 12  # steps for the scale of soft-L1 errors
 
 
 @dataclass(frozen=True)
 class Likely:
-    """A fit with n mode pairs in scaled frequency.
+    """A fit in scaled frequency and response.
 
     Parameters
     ----------
+    structure
+        Of the plant.
     theta
-        (4n + 2,) log |gain|, then log omega and log zeta of zero modes and of pole modes, then the delay.
+        The parameters that :class:`identification.structure.Structure` describes.
     sign
         Of the gain.
     floor, relative
-        a and b in E|error|^2 = (a^2 + b^2 |P|^2) times the excitation's factor.
+        a and b in scale^2 = (a^2 + b^2 |P|^2) times the excitation's factor; scale^2 is E|error|^2 for Gaussian
+        errors.
     deviance
         -2 log likelihood.
     """
 
+    structure: Structure
     theta: Real
     sign: float
     floor: float
@@ -42,127 +51,173 @@ class Likely:
     deviance: float
 
 
-def response_of(theta: Real, omega: Real) -> Complex:
-    """|gain|/s prod(zero modes)/prod(pole modes) exp(-delay s) at s = j omega, (M,)."""
-    s = 1j * omega
-    n = (theta.size - 2) // 4
-    value = np.exp(theta[0] - theta[-1] * s) / s
-    for i in range(2 * n):
-        x = s * np.exp(-theta[1 + 2 * i])
-        factor = 1 + (2 * np.exp(theta[2 + 2 * i]) + x) * x
-        value = value * factor if i < n else value / factor
-    return value
+def noise_levels(error: Real, power: Real, excitation: Real, soft: bool = False) -> tuple[float, float, float]:
+    """Maximum likelihood a^2 and b^2 of scale^2 = (a^2 + b^2 power) excitation from (M,) squared errors.
 
+    Parameters
+    ----------
+    error, power
+        |error|^2 and |P|^2.
+    excitation
+        How scale^2 goes from line to line besides.
+    soft
+        For z = |error|^2/scale^2 the density is exp(-2 (sqrt(1 + z) - 1))/(3/2 pi scale^2), the likelihood whose
+        logarithm is the soft-L1 loss, instead of the Gaussian exp(-z)/(pi scale^2).
 
-def log_jacobian(theta: Real, omega: Real) -> Complex:
-    """Derivative of the logarithm of :func:`response_of` with respect to theta, (M, 4n + 2)."""
-    s = 1j * omega
-    n = (theta.size - 2) // 4
-    jacobian = np.empty((omega.size, theta.size), dtype=complex)
-    jacobian[:, 0] = 1.0
-    jacobian[:, -1] = -s
-    for i in range(2 * n):
-        x = s * np.exp(-theta[1 + 2 * i])
-        damping = 2 * np.exp(theta[2 + 2 * i]) * x
-        inverse = (1 if i < n else -1) / (1 + damping + x * x)
-        jacobian[:, 1 + 2 * i] = -(damping + 2 * x * x) * inverse
-        jacobian[:, 2 + 2 * i] = damping * inverse
-    return jacobian
+    Returns
+    -------
+    tuple
+        a^2, b^2 and the deviance, but for a constant of the data.
 
-
-def noise_levels(error: Real, power: Real, excitation: Real) -> tuple[float, float]:
-    """Maximum likelihood a^2 and b^2 of E|error|^2 = (a^2 + b^2 power) excitation, from (M,) squared errors.
-
-    The common factor follows from the ratio a^2/b^2 in closed form; the ratio is searched for on a grid twice refined,
-    since the likelihood can have an optimum at either end besides the one within.
+    Notes
+    -----
+    The common factor follows from the ratio a^2/b^2, in closed form for Gaussian errors; the ratio is searched for on
+    a grid twice refined, since the likelihood can have an optimum at either end besides the one within.
     """
     typical = float(np.median(power))
     q = error / excitation
     log_ratio, half_width = 0.0, RATIOS
-    for _ in range(3):
-        grid = log_ratio + np.linspace(-half_width, half_width, 25)
+    for points in (25, 9, 9):
+        grid = log_ratio + np.linspace(-half_width, half_width, points)
         shape = np.exp(grid)[:, None] + power / typical
-        factor = np.maximum(np.mean(q / shape, axis=1), CLOSEST**2 * typical)
-        deviance = np.sum(np.log(factor[:, None] * shape) + q / (factor[:, None] * shape), axis=1)
+        scaled = q / shape
+        least = CLOSEST**2 * typical
+        factor = np.maximum(np.mean(scaled, axis=1), least)
+        if soft:
+            factor = _soft_factor(scaled, factor, least)
+        z = scaled / factor[:, None]
+        loss = 2 * z / (1 + np.sqrt(1 + z)) + np.log(1.5) if soft else z
+        deviance = 2 * np.sum(np.log(factor[:, None] * shape) + loss, axis=1)
         best = int(np.argmin(deviance))
-        log_ratio, half_width = float(grid[best]), half_width / 12
-    return float(factor[best] * np.exp(log_ratio)), float(factor[best] / typical)
+        log_ratio, half_width = float(grid[best]), 2 * half_width / (points - 1)
+    shared = 2 * float(np.sum(np.log(excitation)))
+    return float(factor[best] * np.exp(log_ratio)), float(factor[best] / typical), float(deviance[best]) + shared
 
 
-def maximise(omega: Real, response: Complex, excitation: Real, theta: Real, sigma: Real, *, tolerance: float) -> Likely:
-    """Bounded least squares from ``theta`` with the errors' sigma (M,), then noise and parameters in turn.
+def _soft_factor(scaled: Real, factor: Real, least: float) -> Real:
+    """Zero of mean(z/sqrt(1 + z)) - 1, z = scaled/factor, by Newton's method in log factor, row by row."""
+    for _ in range(NEWTON):
+        z = scaled / factor[:, None]
+        excess = np.mean(z / np.sqrt(1 + z), axis=1) - 1
+        slope = np.mean(z * (1 + z / 2) / (1 + z) ** 1.5, axis=1)
+        step = np.clip(excess / np.maximum(slope, np.finfo(float).tiny), -1.0, 1.0)
+        factor = np.maximum(factor * np.exp(step), least)
+    return factor
 
-    ``tolerance`` is the relative change of the sum of squares at which a turn ends. The gain in ``theta`` is not used.
+
+@dataclass(frozen=True)
+class Lines:
+    """What was measured in one test.
+
+    Parameters
+    ----------
+    omega, response, excitation
+        (M,) frequencies, response, and how the errors' scale^2 goes from line to line besides the noise levels.
+    held_s
+        Sampling interval of a held input, whose response has aliases of the plant on it; None without.
     """
-    n = (theta.size - 2) // 4
-    mode = np.array([[np.log(omega[0] / BAND), np.log(omega[-1] * BAND)], np.log(BOUNDS)])
-    theta, sign = _with_gain(omega, response, sigma, theta)
-    lower = np.concatenate([[theta[0] - GAIN], np.tile(mode[:, 0], 2 * n), [0.0]])
-    upper = np.concatenate([[theta[0] + GAIN], np.tile(mode[:, 1], 2 * n), [np.inf]])
+
+    omega: Real
+    response: Complex
+    excitation: Real
+    held_s: float | None = None
+
+    def aliases(self, structure: Structure, theta: Real, sign: float) -> Complex | float:
+        """What the plant of theta adds to its own response at the lines."""
+        if self.held_s is None:
+            return 0.0
+        return aliases(structure.plant(theta, sign), self.held_s, self.omega)
+
+
+def maximise(
+    lines: Lines,
+    structure: Structure,
+    theta: Real,
+    sigma: Real,
+    *,
+    soft: bool,
+    tolerance: float,
+    enough: float = np.inf,
+) -> Likely:
+    """Bounded least squares from ``theta`` with the errors' sigma (M,), then noise, aliases and parameters in turn.
+
+    ``tolerance`` is the relative change of the cost at which a turn ends. A fit that is not on the way to a deviance
+    below ``enough`` is given up. The gain in ``theta`` is not used.
+    """
+    omega, response = lines.omega, lines.response
+    theta, sign = _with_gain(omega, response, sigma, structure, theta)
+    lower, upper = _bounds(omega, structure, theta)
     best: Likely | None = None
-    for _ in range(ALTERNATIONS):
-        theta = _least_squares(omega, sign * response, sigma, np.clip(theta, lower, upper), (lower, upper), tolerance)
-        model = response_of(theta, omega)
+    for _ in range(ALTERNATIONS if lines.held_s is None else ALIAS_TURNS):
+        start = np.clip(theta, lower, upper)
+        response = lines.response - lines.aliases(structure, start, sign)
+        theta = least_squares(
+            structure, start, omega, sign * response, sigma, (lower, upper), soft=soft, tolerance=tolerance
+        )
+        model = response_of(structure, theta, omega)
+        response = lines.response - lines.aliases(structure, theta, sign)
         power, error = np.abs(model) ** 2, np.abs(sign * response - model) ** 2
-        a2, b2 = noise_levels(error, power, excitation)
-        variance = (a2 + b2 * power) * excitation
-        deviance = 2 * float(np.sum(np.log(variance) + error / variance))
+        a2, b2, deviance = noise_levels(error, power, lines.excitation, soft)
         if best is not None and deviance > best.deviance - 1e-3:
             break
-        best = Likely(theta, sign, float(np.sqrt(a2)), float(np.sqrt(b2)), deviance)
-        sigma = np.sqrt(variance)
+        gained = float(omega.size) if best is None else best.deviance - deviance
+        best = Likely(structure, theta, sign, float(np.sqrt(a2)), float(np.sqrt(b2)), deviance)
+        if deviance - gained > enough:
+            break
+        sigma = np.sqrt((a2 + b2 * power) * lines.excitation)
     assert best is not None
     return best
 
 
-def stacked(columns: Complex) -> Real:
-    """Complex columns (M, p) as real rows (p, 2M), real and imaginary parts interleaved."""
-    return np.ascontiguousarray(columns.T).view(float)
+def maximise_together(
+    parts: Sequence[Lines],
+    structure: Structure,
+    theta: Real,
+    sign: float,
+    *,
+    soft: bool,
+    tolerance: float,
+) -> tuple[Real, float]:
+    """One theta for several responses in the same units, each with its own noise: theta and the deviance.
+
+    Parameters
+    ----------
+    parts
+        The tests.
+    theta
+        Where to start; the gain counts.
+    """
+    omega = np.concatenate([lines.omega for lines in parts])
+    lower, upper = _bounds(omega, structure, theta)
+    for _ in range(ALTERNATIONS if all(lines.held_s is None for lines in parts) else ALIAS_TURNS):
+        sigmas, responses, deviance = [], [], 0.0
+        for lines in parts:
+            model = response_of(structure, theta, lines.omega)
+            responses.append(lines.response - lines.aliases(structure, theta, sign))
+            power = np.abs(model) ** 2
+            a2, b2, share = noise_levels(np.abs(sign * responses[-1] - model) ** 2, power, lines.excitation, soft)
+            sigmas.append(np.sqrt((a2 + b2 * power) * lines.excitation))
+            deviance += share
+        response: Complex = np.concatenate(responses)
+        sigma, start = np.concatenate(sigmas), np.clip(theta, lower, upper)
+        theta = least_squares(
+            structure, start, omega, sign * response, sigma, (lower, upper), soft=soft, tolerance=tolerance
+        )
+    return theta, deviance
 
 
-def _with_gain(omega: Real, response: Complex, sigma: Real, theta: Real) -> tuple[Real, float]:
+def _bounds(omega: Real, structure: Structure, theta: Real) -> tuple[Real, Real]:
+    frequency = structure.frequencies()
+    lower = np.where(frequency, np.log(omega.min() / BAND), np.log(BOUNDS[0]))
+    upper = np.where(frequency, np.log(omega.max() * BAND), np.log(BOUNDS[1]))
+    lower[0], upper[0] = theta[0] - GAIN, theta[0] + GAIN
+    lower[-1], upper[-1] = 0.0, np.inf
+    return lower, upper
+
+
+def _with_gain(omega: Real, response: Complex, sigma: Real, structure: Structure, theta: Real) -> tuple[Real, float]:
     """Theta with the gain that fits best, and its sign."""
-    shape = response_of(np.concatenate([[0.0], theta[1:]]), omega) / sigma
+    shape = response_of(structure, np.concatenate([[0.0], theta[1:]]), omega) / sigma
     gain = float(np.vdot(shape, response / sigma).real / np.vdot(shape, shape).real)
     gain = gain if gain != 0 else 1.0
     return np.concatenate([[np.log(abs(gain))], theta[1:]]), float(np.sign(gain))
-
-
-def _least_squares(
-    omega: Real, response: Complex, sigma: Real, theta: Real, bounds: tuple[Real, Real], tolerance: float
-) -> Real:
-    """Levenberg and Marquardt's method; a parameter at its bound stays there while the slope pushes it out.
-
-    The normal equations of a few scaled parameters are solved: singular values of 2M rows, as
-    scipy.optimize.least_squares takes them, cost ten times the rest. The products are einsum's and not the matrix
-    library's, whose threads cost more than they bring at this size.
-    """
-    lower, upper = bounds
-    model = response_of(theta, omega)
-    residual = (model - response) / sigma
-    cost = float(np.vdot(residual, residual).real)
-    damping, scale = 1e-3, np.zeros(theta.size)
-    for _ in range(EVALUATIONS):
-        rows = stacked((model / sigma)[:, None] * log_jacobian(theta, omega))
-        slope, curvature = np.einsum("im,m->i", rows, residual.view(float)), np.einsum("im,jm->ij", rows, rows)
-        scale = np.maximum(scale, np.diag(curvature))
-        free = np.flatnonzero(((theta > lower) | (slope < 0)) & ((theta < upper) | (slope > 0)) & (scale > 0))
-        unit = np.sqrt(scale[free])
-        scaled, downhill = curvature[np.ix_(free, free)] / (unit[:, None] * unit), -slope[free] / unit
-        while True:
-            moved = theta.copy()
-            moved[free] += np.linalg.solve(scaled + damping * np.eye(free.size), downhill) / unit
-            moved = np.clip(moved, lower, upper)
-            model = response_of(moved, omega)
-            residual = (model - response) / sigma
-            reached = float(np.vdot(residual, residual).real)
-            if reached < cost:
-                break
-            damping *= 8
-            if damping > 1e8:
-                return theta
-        gained, cost, theta = cost - reached, reached, moved
-        damping = max(damping / 8, 1e-14)
-        if gained <= tolerance * cost:
-            break
-    return theta

@@ -1,18 +1,21 @@
-"""The fit of one test: competing first guesses, restarts, and the standard errors of the winner."""
+"""The fit of one test: competing first guesses, random restarts, and the standard errors of the winner."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.files import InputError
 from identification.frequency_response import FrequencyResponse
-from identification.likelihood import Likely, log_jacobian, maximise, response_of, stacked
-from identification.plant import Mode, PlantModel
+from identification.least_squares import log_jacobian, response_of, stacked
+from identification.likelihood import Likely, Lines, maximise
+from identification.moves import grown
+from identification.plant import PlantModel
 from identification.start import guesses
+from identification.structure import Structure
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -20,15 +23,13 @@ Complex = NDArray[np.complex128]
 GUESSES = 4
 RESTARTS = 8
 GROWN = 2  # places tried for one more mode pair, of a grid of places and damping ratios
-GROWN_PLACES = 50
-GROWN_ZETAS = (0.02, 0.15)
-GROWN_APART = 0.5  # largest first distance between the new zero and pole, in logarithms
-PRUNED = 3  # ways tried to leave out a zero mode and a pole mode
+PURSUED = 2  # first guesses that are pursued of those ranked
 COARSE, FINE = 1e-4, 1e-14  # least squares tolerance while guesses compete, and of the winner
-MUCH_BETTER = 1.0  # deviance a line: the other test's residual is 40 % smaller
+ALIKE = 0.5  # deviance a line: two tests with residuals within 30 % are explained alike
 SAME = 1.0  # deviances closer than this are the same optimum
 FIRST_FLOORS = (0.05, 0.002)  # of the median response, in the errors assumed before any are known
 WORST = 0.5  # median distance over the response above which nothing was fitted
+ROUNDING = 1e-7  # errors below are the file's digits
 SINGULAR = 1e-13  # smallest eigenvalue of the scaled information matrix that can be inverted
 
 
@@ -44,228 +45,251 @@ class OneFit:
     ----------
     name
         The test's.
+    structure
+        Of the plant.
     theta
-        (4n + 2,) log |gain|, then log omega and log zeta of the zero modes and of the pole modes, each sorted by
-        omega, then the delay in seconds.
+        (p,) parameters of the structure in physical units, modes sorted by omega.
     sign
         Of the gain.
-    errors
-        (4n + 2,) standard errors of theta from the noise of this test.
+    covariance
+        (p, p) of theta, from residuals that are noise.
+    deviance
+        -2 log likelihood, of the response in units of its own.
+    spread
+        Factor between the covariance and the inverse curvature of the squared residuals, see :meth:`ScaledTest.finish`.
+    misfit
+        What the covariance of theta is to be multiplied by and added on account of residuals that are no noise but what
+        the model leaves; 0 when neighbouring residuals correlate no more than by chance.
     floor, relative
-        a and b of the noise E|error|^2 = a^2 + b^2 |P|^2, estimated; a in the response's unit.
+        a and b of the noise E|error|^2 = a^2 + b^2 |P|^2, estimated; a in the response's unit. For soft-L1 errors
+        the same of their scale.
     chi_square
         Squared residuals over their variance, per degree of freedom; near 1 because a and b are estimated.
     correlation
         Of neighbouring normalised residuals; 0 within 1/sqrt(lines) when they are noise.
+    distance
+        Median of |test - plant|/|test|.
     lines
         M, the number of frequencies.
     """
 
     name: str
+    structure: Structure
     theta: Real
     sign: float
-    errors: Real
+    covariance: Real
+    deviance: float
+    spread: float
+    misfit: float
     floor: float
     relative: float
     chi_square: float
     correlation: float
+    distance: float
     lines: int
+
+    @property
+    def errors(self) -> Real:
+        """(p,) standard errors of theta from the residuals of this test, noise and misfit."""
+        return np.sqrt(np.diag(self.covariance) * (1 + self.misfit))
 
     @property
     def plant(self) -> PlantModel:
         """The test's own model."""
-        return plant_from_theta(self.theta, self.sign)
-
-
-def plant_from_theta(theta: Real, sign: float) -> PlantModel:
-    """The plant of the parameters in :class:`OneFit`."""
-    n = (theta.size - 2) // 4
-    modes = [Mode(float(omega), float(zeta)) for omega, zeta in np.exp(theta[1:-1]).reshape(-1, 2)]
-    return PlantModel(float(sign * np.exp(theta[0])), tuple(modes[:n]), tuple(modes[n:]), float(theta[-1]))
+        return self.structure.plant(self.theta, self.sign)
 
 
 class ScaledTest:
     """One test in units where its frequencies and its response are of order 1, so that units cannot matter."""
 
-    def __init__(self, test: FrequencyResponse) -> None:
+    def __init__(self, test: FrequencyResponse, soft: bool) -> None:
         self.name = test.name
+        self.soft = soft
         self.centre = float(np.sqrt(test.omega[0] * test.omega[-1]))
         self.level = float(np.median(np.abs(test.response))) or float(np.max(np.abs(test.response)))
         self.omega = test.omega / self.centre
-        self.response = test.response / self.level
-        self.excitation = np.ones_like(self.omega) if test.excitation is None else test.excitation
+        excitation = np.ones_like(self.omega) if test.excitation is None else test.excitation
+        held_s = test.record.sampling_s * self.centre if test.record is not None and test.record.held else None
+        self.lines = Lines(self.omega, test.response / self.level, excitation, held_s)
 
-    def fit(self, modes: int, simpler: Likely | None = None) -> Likely:
-        """The likeliest of several guesses, which may build on a fit with one mode pair less.
+    def fit(self, structure: Structure, simpler: Likely | None, enough: float) -> Likely:
+        """The likeliest of several guesses, which may build on a fit with one zero mode and pole mode less.
 
-        Stops early when two guesses lead to the same optimum.
+        Stops early when two guesses lead to the same optimum, or a few stay far above the deviance ``enough``.
         """
         best: Likely | None = None
-        for theta, sigma in self._starts(modes, simpler):
-            found = self._maximise(theta, sigma)
+        for tried, (theta, sigma) in enumerate(self._starts(structure, simpler), 1):
+            found = self._maximise(structure, theta, sigma, enough=enough)
             agree = best is not None and abs(found.deviance - best.deviance) < SAME
             if best is None or found.deviance < best.deviance:
                 best = found
-            if agree:
+            if agree or (tried >= GUESSES and best.deviance > enough + ALIKE * self.omega.size):
                 break
         assert best is not None
         return best
 
-    def _starts(self, modes: int, simpler: Likely | None) -> Iterator[tuple[Real, Real]]:
+    def _starts(self, structure: Structure, simpler: Likely | None) -> Iterator[tuple[Real, Real]]:
         """First parameters and the errors' sigma to begin with, the most promising first; costly ones come late."""
-        grown = [] if simpler is None else [(theta, self._sigma(simpler)) for theta in self._grow(simpler)]
+        more: list[tuple[Real, Real]] = []
+        if simpler is not None:
+            sigma = self._sigma(simpler)
+            more = [(theta, sigma) for theta in grown(simpler, self.omega, self._response(simpler), sigma, GROWN)]
+        response = self.lines.response if simpler is None else self._response(simpler)
         for floor in FIRST_FLOORS:
-            sigma = self._first_sigma(floor)
-            for guess in guesses(self.omega, self.response, sigma, modes, GUESSES):
-                yield np.concatenate([[0.0], guess]), sigma
-                if grown:
-                    yield grown.pop(0)
+            sigma = np.asarray(np.sqrt((np.abs(response) ** 2 + floor**2) * self.lines.excitation))
+            for guess in guesses(self.omega, response, sigma, structure, GUESSES):
+                yield guess, sigma
+                if more:
+                    yield more.pop(0)
 
-    def _grow(self, simpler: Likely) -> list[Real]:
-        """Parameters with one more mode pair, a zero and a pole close together where that explains most residual.
+    def pursue(self, structure: Structure, starts: Iterable[Real], known: Likely, enough: float) -> Likely:
+        """The likeliest fit from the most promising of ``starts``, with the errors of a fit that is known already."""
+        sigma = self._sigma(known)
+        promising = self._ranked(structure, starts, self._response(known), sigma)[:PURSUED]
+        fits = [self._maximise(structure, theta, sigma, enough=enough) for theta in promising]
+        return min(fits, key=lambda likely: likely.deviance)
 
-        A zero mode over an equal pole mode is 1. Moved apart a little, they multiply the model by 1 + d1 g1
-        + d2 g2 with g the derivatives of the mode's logarithm; d is fitted to the residual for each place
-        and damping of a grid.
-        """
-        sigma = self._sigma(simpler)
-        residual = simpler.sign * self._residual(simpler) / sigma
-        model = response_of(simpler.theta, self.omega) / sigma
-        known = model[:, None] * log_jacobian(simpler.theta, self.omega)
-        basis, _ = np.linalg.qr(stacked(known).T)
-        places, zetas = np.meshgrid(np.geomspace(self.omega[0], self.omega[-1], GROWN_PLACES), GROWN_ZETAS)
-        x = 1j * self.omega[:, None] / places.ravel()
-        damping = 2 * zetas.ravel() * x
-        factor = model[:, None] / (1 + damping + x * x)
-        rows = np.stack([stacked(-(damping + 2 * x * x) * factor), stacked(damping * factor)], axis=1)
-        inside = np.einsum("cim,mb->cib", rows, basis)
-        gram = np.einsum("cim,cjm->cij", rows, rows) - np.einsum("cib,cjb->cij", inside, inside)
-        gram += 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(2)
-        seen = np.einsum("cim,m->ci", rows, residual.view(float)) - inside @ (residual.view(float) @ basis)
-        apart = np.linalg.solve(gram, seen[..., None])[..., 0]
-        zeros, poles = np.split(simpler.theta[1:-1], 2)
-        starts = []
-        for i in np.argsort(np.sum(seen * apart, axis=1))[::-1][:GROWN]:
-            mode = np.log([places.flat[i], zetas.flat[i]])
-            half = np.clip(apart[i], -GROWN_APART, GROWN_APART) / 2
-            starts.append(
-                np.concatenate([simpler.theta[:1], zeros, mode + half, poles, mode - half, simpler.theta[-1:]])
-            )
-        return starts
+    def _ranked(self, structure: Structure, starts: Iterable[Real], response: Complex, sigma: Real) -> list[Real]:
+        """``starts``, each with its best gain, by a cost that a few lines far off cannot decide."""
+
+        def cost(theta: Real) -> float:
+            shape = response_of(structure, theta, self.omega) / sigma
+            gain = np.vdot(shape, response / sigma).real / np.vdot(shape, shape).real
+            return float(np.sum(np.log1p(np.abs(gain * shape - response / sigma) ** 2)))
+
+        return sorted(starts, key=cost)
+
+    def follow(self, other: ScaledTest, theirs: Likely) -> Likely:
+        """What the parameters that fit another test lead to."""
+        theta = self.to_scaled(theirs.structure, other.to_physical(theirs.structure, theirs.theta))
+        return self._maximise(theirs.structure, theta, self._sigma(theirs))
+
+    def as_well(self, mine: Likely, other: ScaledTest, theirs: Likely) -> bool:
+        """Whether this test is explained as well as another one."""
+        return mine.deviance / self.omega.size < theirs.deviance / other.omega.size + ALIKE
 
     def restart(self, so_far: Likely, rng: np.random.Generator) -> Likely:
         """The likeliest of ``so_far`` and of random modes within the band."""
-        sigma = self._sigma(so_far)
+        structure, sigma = so_far.structure, self._sigma(so_far)
         best = so_far
-        low, high = np.log(self.omega[0]), np.log(self.omega[-1])
-        pairs = (so_far.theta.size - 2) // 2
+        frequency, (low, high) = structure.frequencies(), np.log(self.omega[[0, -1]])
         for _ in range(RESTARTS):
-            modes = np.column_stack([rng.uniform(low, high, pairs), rng.uniform(np.log(0.003), np.log(0.7), pairs)])
-            delay = so_far.theta[-1] * rng.uniform(0.5, 1.5)
-            found = self._maximise(np.concatenate([[0.0], modes.ravel(), [delay]]), sigma)
-            best = min(best, found, key=lambda likely: likely.deviance)
+            theta = rng.uniform(np.log(0.003), np.log(0.7), structure.size)
+            theta[frequency] = rng.uniform(low, high, int(frequency.sum()))
+            theta[-1] = so_far.theta[-1] * rng.uniform(0.5, 1.5)
+            best = min(best, self._maximise(structure, theta, sigma), key=lambda likely: likely.deviance)
         return best
 
-    def adopt(self, so_far: Likely, other: ScaledTest, theirs: Likely) -> Likely:
-        """The likelier of ``so_far`` and what the parameters of a much better fitted test lead to."""
-        if so_far.deviance / self.omega.size < theirs.deviance / other.omega.size + MUCH_BETTER:
-            return so_far
-        theta = self._shift(other.to_physical(theirs.theta), -np.log(self.centre), -np.log(self.level), self.centre)
-        found = self._maximise(theta, self._first_sigma(FIRST_FLOORS[0]))
-        return min(so_far, found, key=lambda likely: likely.deviance)
-
-    def prune(self, so_far: Likely, richer: Likely) -> Likely:
-        """The likelier of ``so_far`` and what a fit with one more mode pair leads to without its least needed pair."""
-        n = (richer.theta.size - 2) // 4
-        modes = richer.theta[1:-1].reshape(2, n, 2)
-        s = 1j * self.omega[:, None]
-        factors = np.log([1 + (2 * np.exp(m[:, 1]) + s / np.exp(m[:, 0])) * s / np.exp(m[:, 0]) for m in modes])
-        effect = np.median(np.abs(factors[0][:, :, None] - factors[1][:, None, :]), axis=0)
-        best = so_far
-        for flat in np.argsort(effect, axis=None)[:PRUNED]:
-            zero, pole = np.unravel_index(flat, effect.shape)
-            kept = np.concatenate([np.delete(modes[0], zero, axis=0), np.delete(modes[1], pole, axis=0)])
-            theta = np.concatenate([[0.0], kept.ravel(), richer.theta[-1:]])
-            best = min(best, self._maximise(theta, self._sigma(richer)), key=lambda likely: likely.deviance)
-        return best
+    @property
+    def chance(self) -> float:
+        """Correlation of neighbouring residuals that noise alone hardly reaches."""
+        return 3 / float(np.sqrt(self.omega.size))
 
     def correlation(self, likely: Likely) -> float:
-        """Of neighbouring residuals, each over its standard deviation."""
+        """Of neighbouring residuals, each over its standard deviation; real part."""
         r = self._residual(likely) / self._sigma(likely)
         power = float(np.sum(np.abs(r) ** 2))
-        return float(abs(np.vdot(r[1:], r[:-1])) / power) if power > 0 else 0.0
+        return float(np.vdot(r[1:], r[:-1]).real / power) if power > 0 else 0.0
+
+    def exact(self, likely: Likely) -> bool:
+        """Whether nothing but rounding is left."""
+        return max(likely.floor, likely.relative) < ROUNDING
 
     def finish(self, likely: Likely) -> OneFit:
-        """Polish the fit and give its parameters and their standard errors in physical units.
+        """Polish the fit and give its parameters and their covariance in physical units.
 
         Raises
         ------
         InputError
-            The model is nowhere near the data, or the data leave a parameter undetermined.
+            The model is nowhere near the data.
+        Undetermined
+            The data leave a parameter undetermined.
+
+        Notes
+        -----
+        With rows r of the residuals' derivatives over sigma, psi the loss's derivative and errors alike at all lines
+        the covariance is E|psi|^2/E(psi')^2 (sum r r')^-1 (Huber, "Robust Statistics", section 7.6).
         """
-        likely = self._maximise(likely.theta, self._sigma(likely), FINE)
-        n = (likely.theta.size - 2) // 4
-        distance = float(np.median(np.abs(self._residual(likely)) / np.maximum(np.abs(self.response), 1e-300)))
+        likely = self._maximise(likely.structure, likely.theta, self._sigma(likely), FINE)
+        structure = likely.structure
+        likely = replace(likely, theta=likely.theta[structure.in_order(likely.theta)])
+        distance = float(np.median(np.abs(self._residual(likely)) / np.maximum(np.abs(self._response(likely)), 1e-300)))
         if distance > WORST:
             raise InputError(
-                f"{self.name}: no stable minimum phase plant with an integrator and {n} mode pairs fits (median "
-                f"distance {100 * distance:.0f} % of the response); expected at most {100 * WORST:.0f} %"
+                f"{self.name}: no stable minimum phase plant with {structure} fits (median distance "
+                f"{100 * distance:.0f} % of the response); expected at most {100 * WORST:.0f} %"
             )
-        sigma = self._sigma(likely)
-        model = response_of(likely.theta, self.omega) / sigma
-        rows = stacked(model[:, None] * log_jacobian(likely.theta, self.omega))
-        information = 2 * rows @ rows.T
-        scale = 1 / np.sqrt(np.diag(information))
-        values, vectors = np.linalg.eigh(information * scale[:, None] * scale)
-        if not values[0] > SINGULAR:
-            raise Undetermined(
-                f"{self.name}: the data do not determine {n} mode pairs; expected fewer modes or more lines"
-            )
-        freedom = 2 * self.omega.size - likely.theta.size
-        covariance = np.sum(vectors**2 / values, axis=1) * scale**2 * 2 * self.omega.size / freedom
-        order = _sorted(likely.theta)
-        errors = np.sqrt(covariance)[order]
-        errors[-1] /= self.centre
+        correlation = self.correlation(likely)
+        z = np.abs(self._residual(likely) / self._sigma(likely)) ** 2
+        freedom = 1 - structure.size / (2 * self.omega.size)
+        spread = float(np.mean(z)) / 2 / freedom
+        if self.soft:
+            spread = float(np.mean(z / (1 + z)) / 2 / np.mean((1 + z / 2) / (1 + z) ** 1.5) ** 2) / freedom
         return OneFit(
             name=self.name,
-            theta=self.to_physical(likely.theta)[order],
+            structure=structure,
+            theta=self.to_physical(structure, likely.theta),
             sign=likely.sign,
-            errors=errors,
+            covariance=self._covariance(likely, spread),
+            deviance=likely.deviance,
+            spread=spread,
+            misfit=2 * correlation / (1 - correlation) if correlation > self.chance else 0.0,
             floor=likely.floor * self.level,
             relative=likely.relative,
-            chi_square=2 * float(np.sum(np.abs(self._residual(likely) / sigma) ** 2)) / freedom,
-            correlation=self.correlation(likely),
+            chi_square=float(np.mean(z)) / freedom,
+            correlation=correlation,
+            distance=distance,
             lines=self.omega.size,
         )
 
-    def to_physical(self, theta: Real) -> Real:
+    def covariance_at(self, fit: OneFit, theta: Real) -> Real:
+        """The covariance of this test's ``fit`` if ``theta`` (p,) in physical units were the truth."""
+        scaled = self.to_scaled(fit.structure, theta)
+        likely = Likely(fit.structure, scaled, fit.sign, fit.floor / self.level, fit.relative, np.nan)
+        return self._covariance(likely, fit.spread)
+
+    def _covariance(self, likely: Likely, spread: float) -> Real:
+        """Covariance (p, p) of theta in physical units."""
+        structure, sigma = likely.structure, self._sigma(likely)
+        model = response_of(structure, likely.theta, self.omega) / sigma
+        rows = stacked(model[:, None] * log_jacobian(structure, likely.theta, self.omega))
+        curvature = rows @ rows.T
+        scale = 1 / np.sqrt(np.diag(curvature))
+        values, vectors = np.linalg.eigh(curvature * scale[:, None] * scale)
+        if not values[0] > SINGULAR:
+            raise Undetermined(f"{self.name}: the data do not determine {structure}; expected fewer or more lines")
+        units = np.append(np.ones(structure.size - 1), 1 / self.centre)
+        weighted = vectors * (scale * units)[:, None]
+        return np.asarray(spread * (weighted / values) @ weighted.T)
+
+    def to_physical(self, structure: Structure, theta: Real) -> Real:
         """Parameters in physical units from scaled ones."""
-        return self._shift(theta, np.log(self.centre), np.log(self.level), 1 / self.centre)
+        return _shift(structure, theta, np.log(self.centre), np.log(self.level), 1 / self.centre)
 
-    @staticmethod
-    def _shift(theta: Real, log_centre: float, log_level: float, delay_unit: float) -> Real:
-        moved = theta.copy()
-        moved[0] += log_centre + log_level
-        moved[1:-1:2] += log_centre
-        moved[-1] *= delay_unit
-        return moved
+    def to_scaled(self, structure: Structure, theta: Real) -> Real:
+        """Scaled parameters from those in physical units."""
+        return _shift(structure, theta, -np.log(self.centre), -np.log(self.level), self.centre)
 
-    def _maximise(self, theta: Real, sigma: Real, tolerance: float = COARSE) -> Likely:
-        return maximise(self.omega, self.response, self.excitation, theta, sigma, tolerance=tolerance)
+    def _maximise(
+        self, structure: Structure, theta: Real, sigma: Real, tolerance: float = COARSE, enough: float = np.inf
+    ) -> Likely:
+        return maximise(self.lines, structure, theta, sigma, soft=self.soft, tolerance=tolerance, enough=enough)
+
+    def _response(self, likely: Likely) -> Complex:
+        """What was measured, without the aliases of a fit."""
+        return self.lines.response - self.lines.aliases(likely.structure, likely.theta, likely.sign)
 
     def _residual(self, likely: Likely) -> Complex:
-        return self.response - likely.sign * response_of(likely.theta, self.omega)
-
-    def _first_sigma(self, floor: float) -> Real:
-        return np.asarray(np.sqrt((np.abs(self.response) ** 2 + floor**2) * self.excitation))
+        return self._response(likely) - likely.sign * response_of(likely.structure, likely.theta, self.omega)
 
     def _sigma(self, likely: Likely) -> Real:
-        power = np.abs(response_of(likely.theta, self.omega)) ** 2
-        return np.sqrt((likely.floor**2 + likely.relative**2 * power) * self.excitation)
+        power = np.abs(response_of(likely.structure, likely.theta, self.omega)) ** 2
+        return np.sqrt((likely.floor**2 + likely.relative**2 * power) * self.lines.excitation)
 
 
-def _sorted(theta: Real) -> NDArray[np.intp]:
-    """The order of theta's entries that sorts zero modes and pole modes by omega."""
-    modes = np.arange(1, theta.size - 1).reshape(2, -1, 2)
-    by_omega = np.argsort(theta[modes[..., 0]], axis=1)
-    return np.concatenate([[0], np.take_along_axis(modes, by_omega[..., None], axis=1).ravel(), [theta.size - 1]])
+def _shift(structure: Structure, theta: Real, log_centre: float, log_level: float, delay_unit: float) -> Real:
+    moved = theta.copy()
+    moved[structure.frequencies()] += log_centre
+    moved[0] += log_level + structure.integrators * log_centre
+    moved[-1] *= delay_unit
+    return moved

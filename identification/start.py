@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.polynomial import Polynomial, chebyshev
 from numpy.typing import NDArray
+
+from identification.structure import Structure
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -37,37 +41,37 @@ def group_delay(omega: Real, response: Complex) -> float:
     return max(0.0, float(best - np.median(left / step)))
 
 
-def guesses(omega: Real, response: Complex, sigma: Real, modes: int, keep: int) -> list[Real]:
-    """The ``keep`` best first guesses with ``modes`` zero and pole modes, best first.
+def guesses(omega: Real, response: Complex, sigma: Real, structure: Structure, keep: int) -> list[Real]:
+    """The ``keep`` best first guesses of a structure, best first.
 
     Parameters
     ----------
     omega, response, sigma
         (M,) frequencies of order 1, response and the assumed standard deviation of its error.
-    modes
-        n, the number of zero modes and of pole modes.
+    structure
+        Of the plant.
 
     Returns
     -------
-    list of (4n + 1,) arrays
-        Zero modes then pole modes as log omega, log zeta pairs, then the delay.
+    list of (zeros + poles + 2,) arrays
+        theta of :class:`identification.structure.Structure`, its gain left at 0.
 
     Notes
     -----
-    Sanathanan-Koerner iterations for all delays of a grid at once: j omega e^{j omega h} H is fitted by N/D, N and D of
-    degree 2n with D's leading coefficient 1, in Chebyshev polynomials of omega^2 (even and odd powers
-    of j omega apart). Roots in the right half plane are reflected.
+    Sanathanan-Koerner iterations for all delays of a grid at once: (j omega)^q e^{j omega h} H is fitted by N/D of the
+    structure's degrees, D's leading coefficient 1, in Chebyshev polynomials of omega^2 (even and odd powers of
+    j omega apart). Roots in the right half plane are reflected.
     """
     width = omega[-1] - omega[0]
-    turns = np.arange(-3 * modes - 3, 3 * modes + 4)
-    delays = np.unique(np.maximum(0.0, group_delay(omega, response) + turns / width))
+    far = 3 * (max(structure.zeros, structure.poles) // 2) + 3
+    delays = np.unique(np.maximum(0.0, group_delay(omega, response) + np.arange(-far, far + 1) / width))
     top = omega[-1]
-    even = chebyshev.chebvander(2 * (omega / top) ** 2 - 1, modes)
-    odd = 1j * (omega / top)[:, None] * even[:, :modes]
-    numerator = np.concatenate([even, odd], axis=1)
-    denominator = np.concatenate([even[:, :modes], odd], axis=1)
-    target = 1j * omega * response * np.exp(1j * delays[:, None] * omega)
-    noise = omega * sigma
+    powers = _powers(omega / top, max(structure.zeros, structure.poles))
+    numerator = powers[:, : structure.zeros + 1]
+    denominator = powers[:, : structure.poles]
+    integrators = (1j * omega) ** structure.integrators
+    target = integrators * response * np.exp(1j * delays[:, None] * omega)
+    noise = np.abs(integrators) * sigma
     rows = np.concatenate(
         [
             np.broadcast_to(numerator.T, (delays.size, numerator.shape[1], omega.size)),
@@ -75,26 +79,34 @@ def guesses(omega: Real, response: Complex, sigma: Real, modes: int, keep: int) 
         ],
         axis=1,
     )
-    leading = target * even[:, modes]
+    leading = target * powers[:, structure.poles]
     previous = np.ones_like(target)
     costs = np.full(delays.size, np.inf)
     best = np.zeros((delays.size, rows.shape[1]))
     for _ in range(ITERATIONS):
         weight = 1 / (noise * np.abs(previous))
-        weighted = (rows * weight[:, None, :]).view(float)
+        weighted = np.ascontiguousarray(rows * weight[:, None, :]).view(float)
         gram = _gram(weighted)
         scale = np.sqrt(np.einsum("kii->ki", gram)) + np.finfo(float).tiny
         gram = gram / (scale[:, :, None] * scale[:, None, :]) + 1e-14 * np.eye(gram.shape[1])
         moment = np.einsum("kim,km->ki", weighted, (leading * weight).view(float)) / scale
         solution = np.linalg.solve(gram, moment[..., None])[..., 0] / scale
-        previous = even[:, modes] + np.einsum("kp,mp->km", solution[:, 2 * modes + 1 :], denominator)
+        previous = powers[:, structure.poles] + np.einsum("kp,mp->km", solution[:, structure.zeros + 1 :], denominator)
         previous = np.where(previous == 0, np.finfo(float).tiny, previous)
-        fitted = np.einsum("kp,mp->km", solution[:, : 2 * modes + 1], numerator) / previous
+        fitted = np.einsum("kp,mp->km", solution[:, : structure.zeros + 1], numerator) / previous
         cost = np.sum(np.log1p(np.abs((target - fitted) / noise) ** 2), axis=1)
         better = cost < costs
         costs[better], best[better] = cost[better], solution[better]
     order = np.argsort(costs)[:keep]
-    return [_guess(best[k], delays[k], modes, top, omega) for k in order]
+    return [_guess(structure, best[k], delays[k], top, omega) for k in order]
+
+
+def _powers(x: Real, degree: int) -> Complex:
+    """Columns like (j x)^0 ... (j x)^degree, (M, degree + 1): column k is T_(k // 2)(2 x^2 - 1), by j x for odd k."""
+    even = chebyshev.chebvander(2 * x**2 - 1, degree // 2)
+    columns = np.repeat(even, 2, axis=1)[:, : degree + 1].astype(complex)
+    columns[:, 1::2] *= 1j * x[:, None]
+    return columns
 
 
 def _gram(rows: Real) -> Real:
@@ -108,35 +120,37 @@ def _gram(rows: Real) -> Real:
     return total
 
 
-def _guess(solution: Real, delay: float, modes: int, top: float, omega: Real) -> Real:
-    zeros = solution[: 2 * modes + 1]
-    poles = solution[2 * modes + 1 :]
-    return np.concatenate(
-        [
-            _modes(zeros[: modes + 1], zeros[modes + 1 :], top, omega),
-            _modes(np.append(poles[:modes], 1.0), poles[modes:], top, omega),
-            [delay],
-        ]
-    )
+@cache
+def _in_powers_of_s(degree: int) -> Real:
+    """Row k: the coefficients of column k of :func:`_powers` in s = j x, lowest power first."""
+    t = Polynomial([-1.0, 0.0, -2.0])  # 2 x^2 - 1
+    rows = np.zeros((degree + 1, degree + 1))
+    for k in range(degree + 1):
+        even = Polynomial(chebyshev.cheb2poly(np.eye(degree + 1)[k // 2]))(t).coef[: 2 * (k // 2) + 1]
+        rows[k, k % 2 : k % 2 + even.size] = even
+    return rows
 
 
-def _modes(even: Real, odd: Real, top: float, omega: Real) -> Real:
-    """Log omega, log zeta of each pair of roots of E(t) + (s/top) O(t), t = -2 (s/top)^2 - 1."""
-    if odd.size == 0:
-        return np.zeros(0)
-    t = Polynomial([-1.0, 0.0, -2.0])
-    s = Polynomial([0.0, 1.0])
-    polynomial = Polynomial(chebyshev.cheb2poly(even))(t) + s * Polynomial(chebyshev.cheb2poly(odd))(t)
-    coefficients = np.zeros(2 * odd.size + 1)
-    coefficients[: polynomial.coef.size] = polynomial.coef
-    # A vanishing leading coefficient means a mode far above the band.
-    smallest = 1e-12 * np.max(np.abs(coefficients))
-    coefficients[-1] = coefficients[-1] if abs(coefficients[-1]) > smallest else smallest
-    roots = top * np.roots(coefficients[::-1])
-    pairs = [root for root in roots if root.imag > 0]
-    real = sorted(abs(root.real) for root in roots if root.imag == 0)
-    found = [(abs(root), abs(root.real) / abs(root)) for root in pairs]
-    found += [(np.sqrt(a * b), (a + b) / (2 * np.sqrt(a * b))) for a, b in zip(real[::2], real[1::2], strict=True)]
-    found.sort()
-    logs = np.log(np.clip(found, [omega[0] / BAND, 2 * BOUNDS[0]], [omega[-1] * BAND, BOUNDS[1] / 2]))
-    return logs.ravel()
+def _guess(structure: Structure, solution: Real, delay: float, top: float, omega: Real) -> Real:
+    zero_modes, real_zeros = _roots(solution[: structure.zeros + 1], top, omega)
+    pole_modes, real_poles = _roots(np.append(solution[structure.zeros + 1 :], 1.0), top, omega)
+    return np.concatenate([[0.0], zero_modes, pole_modes, real_zeros, real_poles, [delay]])
+
+
+def _roots(coefficients: Real, top: float, omega: Real) -> tuple[Real, Real]:
+    """Log omega, log zeta of each mode and log rate of the real root, if any, from coefficients of :func:`_powers`."""
+    degree = coefficients.size - 1
+    if degree == 0:
+        return np.zeros(0), np.zeros(0)
+    polynomial = coefficients @ _in_powers_of_s(degree)
+    # A vanishing leading coefficient means a root far above the band.
+    smallest = 1e-12 * np.max(np.abs(polynomial))
+    polynomial[-1] = polynomial[-1] if abs(polynomial[-1]) > smallest else smallest
+    roots = top * np.roots(polynomial[::-1])
+    lowest, highest = omega[0] / BAND, omega[-1] * BAND
+    real = np.sort(np.clip(np.abs(roots[roots.imag == 0].real), lowest, highest))
+    alone, paired = real[: degree % 2], real[degree % 2 :]
+    found = [(abs(root), abs(root.real) / abs(root)) for root in roots if root.imag > 0]
+    found += [(np.sqrt(a * b), (a + b) / (2 * np.sqrt(a * b))) for a, b in zip(paired[::2], paired[1::2], strict=True)]
+    modes = np.clip(np.array(sorted(found)).reshape(-1, 2), [lowest, 2 * BOUNDS[0]], [highest, BOUNDS[1] / 2])
+    return np.log(modes).ravel(), np.log(alone)

@@ -1,26 +1,38 @@
-"""Raw record of a sweep -> frequency response with the variance of each line (local polynomial method)."""
+"""Raw record of a sweep -> frequency response with the variance of each line (local models of windows of lines)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.discretised import hold
+from identification.excited_lines import excited_band, whole_periods
 from identification.files import InputError
+from identification.local_models import (
+    COEFFICIENTS,
+    SIGNIFICANT,
+    TOGETHER,
+    LocalFit,
+    Windows,
+    fit_windows,
+    pooled,
+    unexplained,
+)
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-Windows = tuple[Complex, Real, Real]
+Indices = NDArray[np.intp]
 
-ORDER = 2
-COEFFICIENTS = 2 * (ORDER + 1)  # of the response and of the transient
 SHORTEST_WINDOW = COEFFICIENTS + 3  # three degrees of freedom left for the variance
 WINDOWS = 600  # aimed at; a longer record makes longer windows
-EXCITED = 0.03  # of the typical power of the excited lines (-15 dB)
-TOGETHER = 9  # windows in one test for a cut-off response
-SIGNIFICANT = 4.0  # F ratio; noise alone gives about 1.2 +- 0.4
-MATERIAL = 1e-5  # of the output's power
+RELATIVE_WIDTH = 1 / 64  # of a window, at most, of its frequency where the shortest window allows it
+BELOW_NYQUIST = 0.8  # of the Nyquist frequency: the part that analysers use; beyond, a held input's alias is as large
+TRUNCATED = 2.0  # F ratio of neighbouring windows together; noise alone gives 1.0 +- 0.3
+EVIDENT = 4.0  # the same, where a transient would cost most of what the windows say about the response
+MATERIAL = 1e-9  # of the output's power
 APART = 2.0  # variances with and without transient, where the two can be told apart
 WEAKEST = 4.0  # lines whose variance is this much over the median's carry little and would widen a bound
 
@@ -36,7 +48,7 @@ class SweepEstimate:
     response
         (M,) output unit per input unit.
     variance
-        (M,) estimate of E|error|^2, from what the local polynomials leave.
+        (M,) estimate of E|error|^2, from what the local models leave.
     excitation
         (M,) how the error's variance goes from line to line on account of the excitation alone: the variance is
         this times the power density of the noise. Its median is 1.
@@ -48,11 +60,16 @@ class SweepEstimate:
     excitation: Real
 
 
-def estimate_response(dt: float, u: Real, y: Real) -> SweepEstimate:
+def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> SweepEstimate:
     """Estimate the response from input ``u`` to output ``y``, both (N,), sampled every ``dt`` seconds.
 
-    Both channels are taken as band-limited alike before they are sampled, as a signal analyser does: the ratio
-    of their spectra is the continuous-time P(j omega), and no hold is divided out.
+    Parameters
+    ----------
+    held
+        False: both channels are band-limited alike before they are sampled, as in a signal analyser, and the ratio
+        of their spectra is the continuous-time P(j omega). True: ``u`` is the command of a converter that holds
+        each value until the next sample, and the ratio, the pulse transfer function, is divided by the factor
+        of the hold. What stays in it besides P are the aliases, :func:`identification.discretised.aliases`.
 
     Raises
     ------
@@ -62,102 +79,168 @@ def estimate_response(dt: float, u: Real, y: Real) -> SweepEstimate:
     Notes
     -----
     First differences of both channels bring an integrator's output back to rest. Their spectra are divided by that
-    of the difference again, so that white noise on the output stays white. In each window of W lines
+    of the difference again, so that white noise on the output stays white. In each window of W lines the output is
+    a smooth response times the input, plus, where it explains more than noise does, a smooth transient: what
+    the record cuts off at its ends. A resonance narrower than the window takes a pole, see
+    :func:`identification.local_models.fit_windows`. The response's quadratic is that of (1 - 1/z) H exp(j omega tau),
+    tau the typical group delay: neither an integrator nor a long dead time bends it.
 
-        Y(k + r) = (h0 + h1 r + h2 r^2) U(k + r) + (t0 + t1 r + t2 r^2) + V(k + r),
-
-    where the second polynomial is what the record cuts off at its ends; it is left out when it explains
-    nothing (it is hard to tell from the response to what a sweep does in its first and last seconds). The
-    response is given at the three zeros of the cubic orthogonal on the window's lines: there the errors of
+    The response is given at the three zeros of the cubic orthogonal on the window's lines: there the errors of
     a quadratic fitted by least squares are uncorrelated, so that nothing of the record is lost, and the
-    cubic term leaves no bias. Windows do not overlap.
+    cubic term leaves no bias. Windows do not overlap. An input that repeats itself is used at the lines of its period.
 
-    References
-    ----------
-    Pintelon, Schoukens, "System Identification: A Frequency Domain Approach", 2nd ed., section 7.2.
+    A second integrator goes on drifting after the first difference: see :func:`_without_drift`.
     """
     if np.ptp(y) == 0:
         raise InputError("the output never changes; expected the response to a sweep")
-    lines = np.arange(1, (u.size - 1) // 2)
-    omega = 2 * np.pi * lines / ((u.size - 1) * dt)
+    u, y, periods = whole_periods(u, y, shortest=6 * SHORTEST_WINDOW)
+    omega: Real = 2 * np.pi * periods * np.arange(1.0, (u.size - 1) // (2 * periods)) / ((u.size - 1) * dt)
     difference = -np.expm1(-1j * omega * dt)
-    big_u, big_y = (np.fft.rfft(np.diff(x))[lines] / difference for x in (u, y))
-    band = _excited_band(np.abs(big_u) ** 2)
+    big_u, big_y = (
+        np.fft.rfft(np.diff(x))[periods : periods * (omega.size + 1) : periods] / difference for x in (u, y)
+    )
+    band = excited_band(np.abs(big_u) ** 2, smoothing=2 * SHORTEST_WINDOW + 1)
+    # Nearer to zero than a window is wide no local model holds.
+    band = band[(band + 1 >= SHORTEST_WINDOW) & (not held or omega[band] < BELOW_NYQUIST * np.pi / dt)]
     if band.size < 3 * SHORTEST_WINDOW:
         raise InputError(
             f"the input excites {band.size} spectral lines; expected {3 * SHORTEST_WINDOW} or more "
             "(a longer record or a wider sweep)"
         )
-    half = max(SHORTEST_WINDOW, band.size // WINDOWS) // 2
-    width = 2 * half + 1
-    count = band.size // width
-    windows = band[(band.size - count * width) // 2 :][: count * width].reshape(count, width)
-    r = np.arange(-half, half + 1) / half
-    node = np.sqrt((3 * half * (half + 1) - 1) / 5) / half
-    nodes = np.array([-node, 0.0, node])
+    step = float(omega[1] - omega[0])
+    tau = _group_delay(big_y[band] * big_u[band].conj(), step)
 
-    omega_nodes = omega[windows[:, half]][:, None] + nodes * half * (omega[1] - omega[0])
-    truncated = _local_polynomials(big_u[windows], big_y[windows], r, nodes, transient=True)
-    at_rest = _local_polynomials(big_u[windows], big_y[windows], r, nodes, transient=False)
-    power = np.sum(np.abs(big_y[windows]) ** 2, axis=1)
-    response, gain, noise = truncated if _cut_off(truncated, at_rest, power, width) else at_rest
+    def bend(at: Real) -> Complex:
+        """What H is when (1 - 1/z) H exp(j omega tau) is 1."""
+        return np.asarray(np.exp(-1j * at * tau) / -np.expm1(-1j * at * dt))
+
+    bent = big_u * bend(omega)
+    tiles = _tiles(band)
+    groups = [Windows(bent[tile], big_y[tile], *_places(tile.shape[1])) for tile in tiles]
+    at_nodes: Real = np.concatenate(
+        [_frequencies(omega[tile], group.nodes) for tile, group in zip(tiles, groups, strict=True)]
+    )
+    fit = _without_drift(groups, [difference[tile] for tile in tiles], u.size, noisy_input=not held)
+    factor = bend(at_nodes) / (hold(at_nodes, dt) if held else 1.0)
+    gain = fit.gain * np.abs(factor) ** 2
     carries = gain < WEAKEST * np.median(gain)
     return SweepEstimate(
-        omega=omega_nodes[carries],
-        response=response[carries],
-        variance=(gain * noise)[carries],
+        omega=at_nodes[carries],
+        response=(fit.response * factor)[carries],
+        variance=(gain * fit.noise[:, None])[carries],
         excitation=(gain / np.median(gain))[carries],
     )
 
 
-def _local_polynomials(u: Complex, y: Complex, r: Real, nodes: Real, *, transient: bool) -> Windows:
-    """Response at the nodes (C, 3), its variance per unit of noise (C, 3) and the noise (C, 1) of C windows."""
-    level = np.sqrt(np.mean(np.abs(u) ** 2, axis=1))[:, None]
-    powers = r[:, None] ** np.arange(ORDER + 1)
-    regressors = (u / level)[..., None] * powers
-    if transient:
-        regressors = np.concatenate([regressors, np.broadcast_to(powers, regressors.shape)], axis=2)
-    q, upper = np.linalg.qr(regressors)
-    at_nodes = np.zeros((upper.shape[-1], nodes.size), dtype=complex)
-    at_nodes[: ORDER + 1] = nodes ** np.arange(ORDER + 1)[:, None]
-    # With R^H W = E the response E^T R^-1 Q^H y is W^H Q^H y, and the columns' squares of W are its variance.
-    weights = np.linalg.solve(np.swapaxes(upper.conj(), 1, 2), np.broadcast_to(at_nodes, (len(u), *at_nodes.shape)))
-    seen = np.swapaxes(q.conj(), 1, 2) @ y[..., None]
-    response = (np.swapaxes(weights.conj(), 1, 2) @ seen)[..., 0] / level
-    left = np.sum(np.abs(y - (q @ seen)[..., 0]) ** 2, axis=1, keepdims=True)
-    return response, np.sum(np.abs(weights) ** 2, axis=1) / level**2, left / (r.size - upper.shape[-1])
+def _without_drift(
+    groups: Sequence[Windows], differences: Sequence[Complex], samples: int, *, noisy_input: bool
+) -> LocalFit:
+    """The windows' fit after taking out a drift of the output that no local model sees, if there is one.
 
-
-def _cut_off(truncated: Windows, at_rest: Windows, power: Real, width: int) -> bool:
-    """Whether the transient explains more than noise does: F ratio of neighbouring windows together.
-
-    What is left must also be a material part of the output's power (C,): a quadratic is never quite the response.
-    Windows where the two polynomials can hardly be told apart have no say: there a transient, which is free of the
-    input's noise, explains the output better than the input does.
+    An output whose slope differs at the record's two ends, as a double integrator's does, adds b/(1 - 1/z)^2 to its
+    spectrum, and one that ends elsewhere than it began a/(1 - 1/z), with real a and b. The differences leave no
+    more of the latter than the noise of two samples. Both follow from all windows together; they are
+    taken out if that explains significantly more, and spares windows the transient or leaves none that needs it.
     """
-    apart = np.mean(truncated[1], axis=1) < APART * np.mean(at_rest[1], axis=1)
-    if not apart.any():
-        return False
-    full, reduced = width - COEFFICIENTS, width - ORDER - 1
-    together = np.ones(min(TOGETHER, int(apart.sum())))
-    left_with = np.convolve(full * truncated[2][apart, 0], together, mode="valid")
-    left_without = np.convolve(reduced * at_rest[2][apart, 0], together, mode="valid")
-    ratio = (left_without - left_with) / (reduced - full) / np.maximum(left_with / full, np.finfo(float).tiny)
-    material = left_without > MATERIAL * np.convolve(power[apart], together, mode="valid")
-    return bool(np.any(material & (ratio > SIGNIFICANT)))
+    truncated, rest = fit_windows(groups, transient=True), fit_windows(groups, transient=False)
+    cut = _needs_transient(truncated, rest, groups, noisy_input=noisy_input)
+    chosen = truncated.where(cut, rest)
+    power = np.concatenate([np.mean(np.abs(group.output) ** 2, axis=1) for group in groups])
+    noise = np.maximum(pooled(truncated.noise), np.finfo(float).eps ** 2 * power) + np.finfo(float).tiny
+    usable = ~truncated.resonant
+    for _ in range(2):
+        if not usable.any():
+            return chosen
+        weights = np.split(usable / noise, np.cumsum([len(group.input) for group in groups])[:-1])
+        moved = _less_drift(groups, differences, weights, samples / (4 * float(np.median(noise))))
+        rest_moved = fit_windows(moved, transient=False)
+        if np.sum((rest.left - rest_moved.left) / noise) < SIGNIFICANT:
+            return chosen
+        usable = ~rest_moved.resonant
+    truncated = fit_windows(moved, transient=True)
+    cut_moved = _needs_transient(truncated, rest_moved, moved, noisy_input=noisy_input)
+    return truncated.where(cut_moved, rest_moved) if cut_moved.sum() < cut.sum() or not cut_moved.any() else chosen
 
 
-def _excited_band(power: Real) -> NDArray[np.intp]:
-    """Indices of the run of neighbouring lines that holds most of the input's energy."""
-    # A noisy input has single weak lines, so the run is found on a wide mean; its ends are then cut on a narrow one.
-    wide, narrow = (
-        np.convolve(power, np.full(width, 1 / width), mode="same") for width in (2 * SHORTEST_WINDOW + 1, 3)
+def _less_drift(
+    groups: Sequence[Windows], differences: Sequence[Complex], weights: Sequence[Real], prior: float
+) -> list[Windows]:
+    """The windows with the likeliest a/(1 - 1/z) + b/(1 - 1/z)^2 taken off; ``prior`` is 1/(2 variance) of a."""
+    information, moment = np.diag([prior, 0.0]), np.zeros(2)
+    drifts = [difference[..., None] ** -np.arange(1, 3) for difference in differences]
+    for group, drift, weight in zip(groups, drifts, weights, strict=True):
+        left = unexplained(group, np.concatenate([drift, group.output[..., None]], axis=2))
+        products = np.einsum("cwi,cwj,c->ij", left.conj(), left, weight).real
+        information += products[:2, :2]
+        moment += products[:2, 2]
+    scale = 1 / np.sqrt(np.diag(information))
+    size = scale * np.linalg.lstsq(information * scale[:, None] * scale, moment * scale, rcond=None)[0]
+    return [replace(group, output=group.output - drift @ size) for group, drift in zip(groups, drifts, strict=True)]
+
+
+def _needs_transient(
+    truncated: LocalFit, rest: LocalFit, groups: Sequence[Windows], *, noisy_input: bool
+) -> NDArray[np.bool_]:
+    """In which windows the transient explains more than noise does: F ratio of neighbouring windows together.
+
+    What is left must also be a material part of the output's power: a local model is never quite the response.
+    Windows in which response and transient can hardly be told apart follow the nearest others, where the
+    evidence is strong; they have no say of their own if the input is noisy: a transient, which is free of that noise,
+    explains the output better there than the input does.
+    """
+    power = np.concatenate([np.sum(np.abs(group.output) ** 2, axis=1) for group in groups])
+    apart = np.mean(truncated.gain, axis=1) < APART * np.mean(rest.gain, axis=1)
+    needs = np.zeros(apart.size, dtype=bool)
+    if apart.any():
+        telling = np.flatnonzero(apart)
+        ratio = _pooled_ratio(truncated, rest, power, telling)
+        nearest = np.argmin(np.abs(np.arange(apart.size)[:, None] - telling), axis=1)
+        needs = ratio[nearest] > np.where(apart, TRUNCATED, EVIDENT)
+    if not noisy_input:
+        needs |= _pooled_ratio(truncated, rest, power, np.arange(apart.size)) > TRUNCATED
+    return needs
+
+
+def _pooled_ratio(truncated: LocalFit, rest: LocalFit, power: Real, windows: Indices) -> Real:
+    """F ratio of ``windows`` (K,), each with its neighbours among them; 0 where nothing material is left."""
+    left_with, left_without, free_with, free_without, total = (
+        np.convolve(x[windows], np.ones(min(TOGETHER, windows.size)), mode="same")
+        for x in (truncated.left, rest.left, truncated.freedom, rest.freedom, power)
     )
-    threshold = EXCITED * np.sum(wide**2) / np.sum(wide)
-    excited = np.concatenate([[False], wide > threshold, [False]])
-    starts, stops = np.flatnonzero(np.diff(excited.astype(int))).reshape(-1, 2).T
-    energy = np.concatenate([[0.0], np.cumsum(power)])
-    best = np.argmax(energy[stops] - energy[starts])
-    run = np.arange(starts[best], stops[best])
-    inside = np.flatnonzero(narrow[run] > threshold)
-    return run[inside[0] : inside[-1] + 1]
+    per_coefficient = (left_without - left_with) / np.maximum(free_without - free_with, 1)
+    ratio = per_coefficient * free_with / np.maximum(left_with, np.finfo(float).tiny)
+    return np.where(left_without > MATERIAL * total, ratio, 0.0)
+
+
+def _frequencies(omega: Real, nodes: Real) -> Real:
+    """The nodes' frequencies (C, 3) in windows of lines ``omega`` (C, W)."""
+    centre, half_width = (omega[:, -1:] + omega[:, :1]) / 2, (omega[:, -1:] - omega[:, :1]) / 2
+    return np.asarray(centre + half_width * nodes)
+
+
+def _places(width: int) -> tuple[Real, Real]:
+    """Places of a window's lines, -1 to 1, and of the zeros of the cubic orthogonal on them."""
+    half = width // 2
+    node = np.sqrt((3 * half * (half + 1) - 1) / 5) / half
+    return np.arange(-half, half + 1) / half, np.array([-node, 0.0, node])
+
+
+def _tiles(band: Indices) -> list[Indices]:
+    """The band's lines in windows of odd width, (C, W) for each width, narrower where frequencies are low."""
+    widest = max(SHORTEST_WINDOW, band.size // WINDOWS) // 2 * 2 + 1
+    tiles, first = [], 0
+    while first < band.size:
+        width = min(widest, max(SHORTEST_WINDOW, int(band[first] * RELATIVE_WIDTH)) // 2 * 2 + 1)
+        last = width == widest
+        lines = band.size - first if last else min(band.size - first, max(width, int(band[first])))
+        count = lines // width
+        spare = (lines - count * width) // 2 if last else 0
+        if count:
+            tiles.append(band[first + spare : first + spare + count * width].reshape(count, width))
+        first = band.size if last or not count else first + count * width
+    return tiles
+
+
+def _group_delay(cross: Complex, step: float) -> float:
+    """Median group delay in seconds of a cross-spectrum (L,) on lines ``step`` rad/s apart, not negative."""
+    return max(0.0, -float(np.median(np.angle(cross[1:] * cross[:-1].conj()))) / step)

@@ -1,23 +1,31 @@
-"""The command line of the figures: ``python -m paper_figures draw NAME... --results DIR --output DIR``."""
+"""The command line of the figures: ``python -m paper_figures draw`` and ``python -m paper_figures summary``."""
 
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from io import StringIO
 from pathlib import Path
 from traceback import walk_tb
-from typing import Protocol, cast
+from typing import Protocol, TypeVar, cast
 
 import click
 import pandas as pd
 from matplotlib.figure import Figure
 
 import paper_figures
+from design.contract import read_design
+from identification.discretised import alias_free
 from identification.files import CommandGroup, InputError, read_text
-from paper_figures import style
+from identification.frequency_response import read_sweeps
+from identification.model import read_model
+from paper_figures import style, summary_page
+from paper_figures.summary import summarise
+from paper_figures.summary_of_designs import FOLLOWING
+
+Result = TypeVar("Result")
 
 
 class FigureModule(Protocol):
@@ -59,6 +67,32 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
         style.save(figure, output, name, caption)
 
 
+@main.command("summary")
+@click.argument("model")
+@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--build",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="Existing folder of the designs, with the tables in its folder results; to write to, too.",
+)
+def summary_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
+    """Sum up MODEL, fitted to SWEEP files, its designs, and what was refused: summary.pdf, .svg, .png and .txt."""
+    identified = read_model(model)
+    tests = [alias_free(test, identified.plant) for test in read_sweeps(sweeps)]
+    designs = read_attempts({name: build / f"design_{name}" for name in FOLLOWING}, ".json", read_design)
+    experiments = [name for names in FOLLOWING.values() for name in names]
+    outcomes = read_attempts({name: build / "results" / name for name in experiments}, "_summary.csv", read_table)
+    tables = {f"{name}_summary": table for name, table in outcomes.items() if isinstance(table, pd.DataFrame)}
+    with missing_columns_named(tables, build / "results", "summary"):
+        said = summarise(identified, tests, designs, outcomes)
+    page = summary_page.draw(said, identified, tests)
+    style.save(page, build, "summary", said.text())
+    click.echo(f"{len(tests)} test{'s' if len(tests) > 1 else ''} -> {build / 'summary.pdf'}")
+    for head, sentence in said.refused:
+        click.echo(f"{head}: {sentence}")
+
+
 def figure_names() -> list[str]:
     """Return the names of all figures, in the order of the thesis."""
     return sorted(
@@ -79,7 +113,35 @@ def figure_module(name: str) -> FigureModule:
     return cast(FigureModule, import_module(f"paper_figures.{name}"))
 
 
-def read_table(path: Path, figure: str) -> pd.DataFrame:
+def read_attempts(stems: Mapping[str, Path], end: str, read: Callable[[Path], Result]) -> dict[str, Result | str]:
+    """Return what commands wrote, or the sentences with which they refused.
+
+    Parameters
+    ----------
+    stems
+        For each name the path of its file without ``end``; a refusal stands in STEM.refused.txt. A name that has
+        neither is left out.
+    end
+        Of the files.
+    read
+        What reads one.
+
+    Raises
+    ------
+    InputError
+        ``read`` refuses a file.
+    """
+    found: dict[str, Result | str] = {}
+    for name, stem in stems.items():
+        path, refusal = (stem.with_name(stem.name + ending) for ending in (end, ".refused.txt"))
+        if path.is_file():
+            found[name] = read(path)
+        elif refusal.is_file() and (lines := read_text(refusal).strip().splitlines()):
+            found[name] = lines[-1].removeprefix("Error: ").rstrip(".")
+    return found
+
+
+def read_table(path: Path, figure: str = "summary") -> pd.DataFrame:
     """Return a table of results, its ``#`` lines left out.
 
     Parameters

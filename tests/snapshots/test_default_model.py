@@ -6,12 +6,12 @@ import numpy as np
 from strict import Strict
 
 from identification.fit import fit_plant
-from identification.frequency_response import read_sweep
+from identification.frequency_response import read_sweeps
 from identification.thesis import DATA
 
 
 def test_default_model(strict_snapshot: Strict) -> None:
-    tests = [read_sweep(path) for path in sorted((DATA / "elevation").glob("*_frf.csv"))]
+    tests = read_sweeps(sorted((DATA / "elevation").glob("*_frf.csv")))
     result = fit_plant(tests)
     plant = result.plant
     modes = [*plant.zero_modes, *plant.pole_modes]
@@ -22,6 +22,6 @@ def test_default_model(strict_snapshot: Strict) -> None:
             "delay_s": np.array([plant.delay_s]),
             **{f"omega_{k}": np.array([mode.omega]) for k, mode in enumerate(modes)},
             **{f"zeta_{k}": np.array([mode.zeta]) for k, mode in enumerate(modes)},
-            **{f"error_{k}": np.array([error]) for k, error in enumerate(result.errors)},
+            **{f"error_{k}": np.array([error]) for k, error in enumerate(result.nominal.errors)},
         },
     )

@@ -16,7 +16,7 @@ from experiments.delay_free import delay_free_tables
 from experiments.extended import extended_tables
 from experiments.f_gamma import f_gamma_tables
 from experiments.pid import pid_tables
-from identification.frequency_response import read_sweep
+from identification.frequency_response import read_sweeps
 from identification.model import read_model
 from identification.thesis import DATA
 from paper_figures.__main__ import figure_module, figure_names
@@ -27,7 +27,7 @@ MOST_ROWS = 120
 
 @cache
 def sweeps() -> tuple[object, ...]:
-    return tuple(read_sweep(path) for path in sorted((DATA / "elevation").glob("*_frf.csv")))
+    return tuple(read_sweeps(sorted((DATA / "elevation").glob("*_frf.csv"))))
 
 
 @pytest.fixture(scope="module")

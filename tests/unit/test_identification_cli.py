@@ -45,7 +45,9 @@ def test_writes_a_model_that_design_can_read(tmp_path: Path, sweeps: list[Path])
     assert model.standard_errors is not None
     assert model.standard_errors["pole_modes"][0].keys() == {"omega", "zeta"}
     assert 0 < model.standard_errors["delay_s"] < 1e-4
-    assert model.fit["modes"] == 1
+    assert model.fit["structure"] == "1 integrator, 1 zero mode, 1 pole mode"
+    lower, upper = (model.fit["intervals_95"][end]["pole_modes"][0]["omega"] for end in ("lower", "upper"))
+    assert lower < model.plant.pole_modes[0].omega < upper
     assert model.fit["synthetic"] is False
     assert [test["name"] for test in model.fit["tests"]] == ["test_0.csv", "test_1.csv"]
     assert model.fit["tests"][0]["sha256"] == hashlib.sha256(sweeps[0].read_bytes()).hexdigest()
@@ -55,12 +57,14 @@ def test_writes_a_model_that_design_can_read(tmp_path: Path, sweeps: list[Path])
 
 def test_prints_estimates_errors_and_scatter(tmp_path: Path, sweeps: list[Path]) -> None:
     lines = _fit(*sweeps, "--output", tmp_path / "model.json").output.splitlines()
-    assert lines[0].split() == ["parameter", "estimate", "std.", "error", "scatter"]
+    assert lines[0].split() == ["parameter", "estimate", "95", "%", "interval", "noise", "scatter"]
     assert lines[1].split()[0] == "gain"
-    assert len(lines[1].split()) == 4
+    assert len(lines[1].split()) == 7
+    assert any(line.startswith("1 integrator, 1 zero mode, 1 pole mode; 2 tests") for line in lines)
+    assert any(line.startswith("W_a = ") for line in lines)
     single = _fit(sweeps[0], "--output", tmp_path / "model.json").output.splitlines()
     assert "scatter" not in single[0]
-    assert len(single[1].split()) == 3
+    assert len(single[1].split()) == 6
 
 
 def test_one_synthetic_file_makes_the_model_synthetic(tmp_path: Path, sweeps: list[Path]) -> None:
@@ -139,11 +143,24 @@ def test_figure_of_another_kind(tmp_path: Path) -> None:
     _refused(_fit(bad, "--output", tmp_path / "m.json", "--figure", figure), tmp_path, "'.gif'", ".pdf, .svg, .png")
 
 
-@pytest.mark.parametrize("modes", ["-1", "x", "2.5", "9", ""])
-def test_modes_is_a_usage_error(tmp_path: Path, modes: str) -> None:
+def test_structure_loss_and_order_of_the_bound_as_asked(tmp_path: Path, sweeps: list[Path]) -> None:
+    output = tmp_path / "model.json"
+    asked = ["--modes", "1/2", "--real", "1/0", "--integrators", 1, "--loss", "soft-l1", "--bound-order", 3]
+    assert _fit(*sweeps, *asked, "--output", output).exit_code == 0
+    model = read_model(str(output))
+    assert model.fit["structure"] == "1 integrator, 1 zero mode, 2 pole modes, 1 real zero"
+    assert model.fit["loss"] == "soft-L1"
+    assert model.additive_bound.order == 3
+    assert model.plant.integrators == 1
+    assert len(model.plant.real_zeros) == 1
+
+
+@pytest.mark.parametrize("option", ["--modes", "--real"])
+@pytest.mark.parametrize("counts", ["-1", "x", "2.5", "9", "", "1/", "1/1/1"])
+def test_counts_are_a_usage_error(tmp_path: Path, option: str, counts: str) -> None:
     bad = _sweep(tmp_path / "bad.csv", 0)
-    result = _fit(bad, "--output", tmp_path / "model.json", f"--modes={modes}")
+    result = _fit(bad, "--output", tmp_path / "model.json", f"{option}={counts}")
     assert result.exit_code == 2
-    assert "expected auto or an integer from 0 to 8" in result.stderr
+    assert "expected auto, N or ZEROS/POLES from 0 to" in result.stderr
     assert "Traceback" not in result.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.csv"]

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from held_plant import PLANTS, held_response, over_hold
 from numpy.typing import NDArray
 
+from identification.discretised import aliases
 from identification.files import InputError
 from identification.plant import Mode, PlantModel
 from identification.sweep import estimate_response
@@ -98,3 +100,130 @@ def test_too_narrow_a_sweep_is_refused() -> None:
     t = np.arange(256) * DT
     with pytest.raises(InputError, match=r"the input excites \d+ spectral lines; expected 27 or more"):
         estimate_response(DT, np.sin(2 * np.pi * 50 * t) * np.hanning(256), np.cos(2 * np.pi * 50 * t))
+
+
+def _multisine(samples: int, stop_hz: float, seed: int) -> Real:
+    spectrum = np.zeros(samples // 2 + 1, dtype=complex)
+    lines = np.arange(int(10 * samples * DT), int(stop_hz * samples * DT))
+    spectrum[lines] = np.exp(2j * np.pi * np.random.default_rng(seed).random(lines.size))
+    u = np.fft.irfft(spectrum, samples)
+    return np.asarray(u / np.std(u))
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_a_held_sweep_gives_the_exact_pulse_transfer_function(name: str) -> None:
+    """Over the hold's factor, that is P and its aliases, to 1e-5 everywhere; the aliases come to 5 % and more."""
+    plant, u = PLANTS[name], _sweep(2**14, 10.0, 350.0)
+    estimate = estimate_response(DT, u, held_response(plant, DT, u), held=True)
+    np.testing.assert_allclose(estimate.response, over_hold(plant, DT, estimate.omega), rtol=1e-5)
+    without = estimate.response - aliases(plant, DT, estimate.omega)
+    np.testing.assert_allclose(without, plant(1j * estimate.omega), rtol=2e-5)
+    assert np.max(np.abs(without / estimate.response - 1)) > 0.05
+    assert estimate.omega.size > 1500
+
+
+@pytest.mark.parametrize("name", PLANTS)
+@pytest.mark.parametrize("kind", ["noise", "multisine", "four periods"])
+def test_other_held_inputs(name: str, kind: str) -> None:
+    """Records that end, and one that begins, in the middle of it: what is cut off leaves 3 % at worst."""
+    plant, samples = PLANTS[name], 2**14
+    u = {
+        "noise": np.random.default_rng(3).standard_normal(samples),
+        "multisine": _multisine(samples, 350.0, 4),
+        "four periods": np.tile(_multisine(samples // 4, 350.0, 5), 4),
+    }[kind]
+    estimate = estimate_response(DT, u, held_response(plant, DT, u), held=True)
+    inside = estimate.omega > 2 * np.pi * 10
+    error = np.abs(estimate.response / over_hold(plant, DT, estimate.omega) - 1)[inside]
+    assert np.max(error) < 0.03
+    assert np.median(error) < 2e-3
+
+
+def test_held_lines_end_below_the_nyquist_frequency() -> None:
+    """There the alias is as large as P itself; band-limited channels are used as far as they are excited."""
+    u = np.random.default_rng(6).standard_normal(2**12)
+    y = held_response(PLANTS["integrator"], DT, u)
+    assert 0.78 < estimate_response(DT, u, y, held=True).omega[-1] * DT / np.pi < 0.8
+    assert estimate_response(DT, u, y).omega[-1] * DT / np.pi > 0.99
+
+
+@pytest.mark.parametrize(
+    ("name", "noise"), [("integrator", 1e-4), ("no integrator, real pole", 1e-4), ("two integrators", 1e-3)]
+)
+@pytest.mark.parametrize("kind", ["sweep", "noise"])
+def test_variances_of_held_records_are_honest(name: str, noise: float, kind: str) -> None:
+    """16 records: the mean over the lines is known to 2 %, a line's to 25 %."""
+    u = _sweep(2**12, 15.0, 350.0) if kind == "sweep" else np.random.default_rng(8).standard_normal(2**12)
+    y = held_response(PLANTS[name], DT, u)
+    rng = np.random.default_rng(7)
+    estimates = [estimate_response(DT, u, y + noise * rng.standard_normal(u.size), held=True) for _ in range(16)]
+    common = sorted(set.intersection(*(set(np.round(e.omega[e.omega > 60], 6)) for e in estimates)))
+    assert len(common) > 300
+    kept = [np.isin(np.round(e.omega, 6), common) for e in estimates]
+    pairs = list(zip(estimates, kept, strict=True))
+    errors = np.array([np.abs(e.response - over_hold(PLANTS[name], DT, e.omega))[k] ** 2 for e, k in pairs])
+    ratio = np.mean(errors, axis=0) / np.mean([e.variance[k] for e, k in pairs], axis=0)
+    assert abs(np.median(ratio) - 1) < 0.06
+    assert abs(np.mean(ratio) - 1) < 0.12
+    over_excitation = np.mean([error / e.excitation[k] for error, (e, k) in zip(errors, pairs, strict=True)], axis=0)
+    for each in (ratio, over_excitation):
+        low, high = np.quantile(each / np.median(each), [0.03, 0.97])
+        assert 0.45 < low < high < 1.9
+
+
+@pytest.mark.parametrize("seconds", [8, 16])
+def test_a_resonance_narrower_than_a_window(seconds: int) -> None:
+    """zeta = 0.008 at 45 Hz is 0.7 Hz wide, a window of 9 lines in 8 s 1.1 Hz: quadratics miss it by 5 %."""
+    plant = PlantModel(7.0, (Mode(175.0, 0.02),), (Mode(282.0, 0.008),), 8.3e-3)
+    u = 5 * _sweep(1000 * seconds, 10.0, 200.0)
+    y = held_response(plant, DT, u)
+    rng = np.random.default_rng(9)
+    worst = []
+    for _ in range(10):
+        estimate = estimate_response(DT, u, y + 1e-3 * rng.standard_normal(u.size), held=True)
+        z = np.abs(estimate.response - over_hold(plant, DT, estimate.omega)) / np.sqrt(estimate.variance)
+        near = np.abs(estimate.omega - 282) < 12
+        assert near.sum() > 5
+        worst.append(np.mean(z[near] ** 2))
+    assert np.mean(worst) < 3.0  # F with 2 and 6 degrees of freedom has mean 1.5
+
+
+def test_offset_drift_and_a_record_that_begins_in_motion() -> None:
+    """A double integrator that flies off during a sweep, on top of a sensor's offset and ramp."""
+    plant = PLANTS["two integrators"]
+    before, u = 0.2 * np.ones(500), _sweep(2**14, 10.0, 350.0)
+    commands = np.concatenate([before, u])
+    y = held_response(plant, DT, commands)[before.size :] + 3.0 + 0.7 * np.arange(u.size) * DT
+    estimate = estimate_response(DT, u, y, held=True)
+    np.testing.assert_allclose(estimate.response, over_hold(plant, DT, estimate.omega), rtol=1e-3)
+    assert np.ptp(y) > 100 * np.ptp(held_response(plant, DT, u))
+
+
+def test_a_long_dead_time_does_not_bend_the_response() -> None:
+    plant, u = PLANTS["half a second late"], _sweep(2**12, 20.0, 200.0)
+    estimate = estimate_response(DT, u, held_response(plant, DT, u), held=True)
+    np.testing.assert_allclose(estimate.response, over_hold(plant, DT, estimate.omega), rtol=1e-3)
+
+
+def test_a_sweep_over_three_decades() -> None:
+    """Exponential in time, its energy falls as 1/frequency; windows are narrow where frequencies are low."""
+    t = np.arange(2**16) * 5 * DT
+    x = np.clip(t / (0.9 * t[-1]), 0, 1)
+    fade = np.sin(np.pi / 2 * np.clip(np.minimum(x, 1 - x) / 0.01, 0, 1)) ** 2
+    u = fade * np.sin(2 * np.pi * 0.05 * 0.9 * t[-1] * (1000.0**x - 1) / np.log(1000))
+    plant = PlantModel(3.0, (), (Mode(3.0, 0.02), Mode(150.0, 0.05)), 4e-3)
+    estimate = estimate_response(5 * DT, u, held_response(plant, 5 * DT, u), held=True)
+    assert estimate.omega[0] < 2 * np.pi * 0.07
+    assert estimate.omega[-1] > 2 * np.pi * 40
+    np.testing.assert_allclose(estimate.response, over_hold(plant, 5 * DT, estimate.omega), rtol=1e-4)
+
+
+def test_units_do_not_matter() -> None:
+    plant, u = PLANTS["integrator"], _sweep(2**12)
+    y = held_response(plant, DT, u) + 1e-3 * np.random.default_rng(10).standard_normal(u.size)
+    plain = estimate_response(DT, u, y, held=True)
+    scaled = estimate_response(1e6 * DT, 1e-20 * u, 1e20 * y, held=True)
+    np.testing.assert_allclose(scaled.omega, 1e-6 * plain.omega, rtol=1e-12)
+    np.testing.assert_allclose(scaled.response, 1e40 * plain.response, rtol=1e-9)
+    np.testing.assert_allclose(scaled.variance, 1e80 * plain.variance, rtol=1e-9)
+    np.testing.assert_allclose(scaled.excitation, plain.excitation, rtol=1e-9)

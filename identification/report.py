@@ -1,0 +1,184 @@
+"""What a fit has to say: the facts that model.json records and the table that a terminal shows."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from identification.fit import FitResult
+from identification.frequency_response import FrequencyResponse
+from identification.model import plant_to_dict
+from identification.one_test import OneFit
+from identification.plant import AdditiveBound, Mode
+from identification.start import BOUNDS
+from identification.subspace import SubspaceCheck
+from identification.uncertainty import BoundReport
+
+WIDTH = 28
+POOR = 0.15  # median distance of a test from its own fit
+
+
+def standard_errors(result: FitResult) -> dict[str, Any]:
+    """The standard errors of the nominal plant in the shape and units of model.json's ``plant``."""
+    return result.structure.to_dict(result.nominal.in_physical_units(result.nominal.errors))
+
+
+def fit_to_dict(result: FitResult) -> dict[str, Any]:
+    """The facts of a fit that model.json records."""
+    lower, upper = result.nominal.intervals
+    shaped = result.structure.to_dict
+
+    def errors(theta: Any) -> dict[str, Any] | None:
+        return None if theta is None else shaped(result.nominal.in_physical_units(theta))
+
+    return {
+        "structure": str(result.structure),
+        "method": "maximum likelihood, each test on its own; mean of the logarithms, mean delay",
+        "loss": "soft-L1" if result.soft else "least squares",
+        "criterion": {
+            "name": "BIC",
+            "overdispersion": result.overdispersion,
+            "by_structure": {str(structure): value for structure, value in result.criterion.items()},
+        },
+        "intervals_95": {"lower": shaped(lower), "upper": shaped(upper)},
+        "noise_standard_errors": errors(result.nominal.noise),
+        "misfit_standard_errors": errors(result.nominal.misfit),
+        "scatter_standard_errors": errors(result.nominal.scatter),
+        "agreement_of_tests": result.nominal.agreement,
+        "tests": [_test_to_dict(test) for test in result.tests],
+    }
+
+
+def _test_to_dict(test: OneFit) -> dict[str, Any]:
+    units = [1.0 if name.startswith("delay") else abs(value) for name, value in test.structure.parameters(test.plant)]
+    return {
+        "name": test.name,
+        "lines": test.lines,
+        "plant": plant_to_dict(test.plant),
+        "standard_errors": test.structure.to_dict(test.errors * units),
+        "noise": {"floor": test.floor, "relative": test.relative},
+        "chi_square": test.chi_square,
+        "residual_correlation": test.correlation,
+        "median_distance": test.distance,
+    }
+
+
+def facts(
+    tests: Sequence[FrequencyResponse], result: FitResult, report: BoundReport, checks: Mapping[str, SubspaceCheck]
+) -> dict[str, Any]:
+    """The ``fit`` object of model.json: the fit, its tests' files, and how W_a lies over the residuals."""
+    content = fit_to_dict(result)
+    for entry, test in zip(content["tests"], tests, strict=True):
+        entry["sha256"] = None if test.path is None else hashlib.sha256(test.path.read_bytes()).hexdigest()
+        entry["synthetic"] = test.synthetic
+    return {
+        "source": "identification fit",
+        "synthetic": any(test.synthetic for test in tests),
+        **content,
+        "bound": {
+            "order": report.bound.order,
+            "largest_excess": report.largest_excess,
+            "mean_excess": report.mean_excess,
+            "least_excess": report.least_excess,
+            "at_lines": asdict(report.at_lines),
+            "between_lines": None if report.between_lines is None else asdict(report.between_lines),
+            "touches": [asdict(touch) for touch in report.touches],
+        },
+        "subspace_check": [{"test": name, **asdict(check), "said": str(check)} for name, check in checks.items()],
+    }
+
+
+def check_lines(checks: Mapping[str, SubspaceCheck]) -> list[str]:
+    """A line for each raw record that was checked."""
+    return [f"check of {name} by {check}" for name, check in checks.items()]
+
+
+def bound_text(bound: AdditiveBound) -> str:
+    """W_a(s) as a formula."""
+
+    def product(modes: Sequence[Mode], rates: Sequence[float]) -> str:
+        factors = [f"(1 + s/{rate:.4g})" for rate in rates]
+        factors += [f"(1 + 2 {mode.zeta:.4g} s/{mode.omega:.4g} + (s/{mode.omega:.4g})^2)" for mode in modes]
+        return " ".join(factors)
+
+    zeros, poles = product(bound.zero_modes, bound.real_zeros), product(bound.pole_modes, bound.real_poles)
+    return f"W_a = {bound.gain:.4g} {zeros}".rstrip() + f" / {poles}"
+
+
+def bound_remarks(report: BoundReport) -> list[str]:
+    """Sentences on how W_a lies over the residuals."""
+    first = report.touches[0]
+    where = "between the lines, where only its own fit speaks," if first.between_lines else "at a line"
+    return [
+        f"W_a is {report.mean_excess:.3g} times the residuals' envelope on average and {report.largest_excess:.3g} "
+        f"times at most; no W_a of order {report.bound.order} gets below {report.least_excess:.3g}",
+        f"it touches the residual of {first.test} {where} at {first.omega:.4g} rad/s",
+    ]
+
+
+def parameter_rows(result: FitResult) -> list[tuple[str, float, float, float, float, float | None]]:
+    """For each parameter its label, estimate, both ends of its 95 % interval, and what noise and scatter alone give.
+
+    The last two are standard errors; the scatter's is None for one test. The noise's contains the misfit.
+    """
+    lower, upper = result.nominal.intervals
+    noise = result.nominal.in_physical_units((result.nominal.noise**2 + result.nominal.misfit**2) ** 0.5)
+    scatter = None if result.nominal.scatter is None else result.nominal.in_physical_units(result.nominal.scatter)
+    return [
+        (
+            label,
+            value,
+            float(lower[k]),
+            float(upper[k]),
+            float(noise[k]),
+            None if scatter is None else float(scatter[k]),
+        )
+        for k, (label, value) in enumerate(result.structure.parameters(result.plant))
+    ]
+
+
+def remarks(result: FitResult) -> list[str]:
+    """Sentences on what the numbers rest on: structure, tests, residuals."""
+    count = len(result.tests)
+    said = [f"{result.structure}; {count} test{'s' if count > 1 else ''}"]
+    distance = 100 * max(test.distance for test in result.tests)
+    said.append(f"median distance of a test from its own fit: at most {distance:.2g} % of the response")
+    if count > 1 and result.nominal.scattered:
+        said.append("the tests differ by more than their noise: intervals by Student's distribution of the scatter")
+    elif count > 1:
+        said.append("the tests differ by no more than their noise: intervals by the noise")
+    correlation = max(test.correlation for test in result.tests)
+    if result.nominal.misfit.any():
+        said.append(
+            f"neighbouring residuals correlate by up to {correlation:.2f}: they are no noise but what this structure "
+            "leaves, and the intervals are widened for it"
+        )
+    if result.overdispersion > 1:
+        said.append(
+            f"the residuals never become noise, whatever the number of modes: their deviance is divided by "
+            f"{result.overdispersion:.3g} in the choice of the structure"
+        )
+    if distance > 100 * POOR:
+        said.append(f"a poor fit: a distance above {100 * POOR:g} % is more than noise leaves on a plant of this class")
+    for kind, modes in (("zero", result.plant.zero_modes), ("pole", result.plant.pole_modes)):
+        for i, mode in enumerate(modes, 1):
+            if mode.zeta < 2 * BOUNDS[0]:
+                said.append(
+                    f"{kind} mode {i} wants less damping than the least that is sought: a {kind} in the right half "
+                    "plane, which this class does not have, or one narrower than the lines lie apart"
+                )
+    if result.plant.delay_s == 0:
+        said.append("no dead time can be told from none")
+    return said
+
+
+def table(result: FitResult) -> str:
+    """Estimate, 95 % interval, and standard errors by noise and by scatter, a line for each parameter; remarks."""
+    head = f"{'parameter':<{WIDTH}}{'estimate':>12}{'95 % interval':>26}{'noise':>11}"
+    lines = [head + (f"{'scatter':>11}" if len(result.tests) > 1 else "")]
+    for label, value, lower, upper, noise, scatter in parameter_rows(result):
+        line = f"{label:<{WIDTH}}{value:>12.5g}{f'{lower:.5g} ... {upper:.5g}':>26}{noise:>11.2g}"
+        lines.append(line + ("" if scatter is None else f"{scatter:>11.2g}"))
+    return "\n".join([*lines, *remarks(result)])

@@ -1,0 +1,98 @@
+"""What the page on a plant says of its designs: the table of the simulated loops, and sentences on each design."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isnan
+from typing import Any
+
+import pandas as pd
+
+from design.contract import Design
+from paper_figures.captions import number, of_run, only, required_input
+from paper_figures.summary_of_fit import Table
+
+DESIGNS = {"delay_free": "Chapter 2", "extended": "Chapters 3, 4"}
+"""Where the thesis has each design."""
+
+FIGURES = {"delay_free": "2.12 to 2.14", "extended": "4.1 to 4.4", "f_gamma": "2.10, 2.11"}
+"""What is drawn of each experiment that needs a design."""
+
+FOLLOWING = {"delay_free": ("delay_free",), "extended": ("f_gamma", "extended")}
+"""The experiments that need each design."""
+
+HEAD = (
+    "loop",
+    "f of (2.19)",
+    "Popov sector",
+    "theta2",
+    "last saturated",
+    "peak error after 1 s",
+    "last period's error",
+)
+RUNS = {"none": "no anti-windup", "thesis": "thesis's anti-windup", "corrected": "corrected anti-windup"}
+
+
+def loop_table(designs: Mapping[str, Design], tables: Mapping[str, pd.DataFrame]) -> Table | None:
+    """A row for each simulated loop: f, Popov sector and theta2 of its anti-windup, and what it does under saturation.
+
+    Parameters
+    ----------
+    designs
+        ``delay_free``, ``extended``.
+    tables
+        What each experiment of the same name summed up.
+
+    Returns
+    -------
+    Table
+        None if nothing was simulated.
+    """
+    rows = [
+        (f"{DESIGNS[name]}, {label}", *_judgement(designs[name].anti_windup.get(run)), *_outcome(tables[name], run))
+        for name in designs
+        if name in tables
+        for run, label in RUNS.items()
+    ]
+    return Table(HEAD, tuple(rows)) if rows else None
+
+
+def sentences(design: Design, name: str, tables: Mapping[str, pd.DataFrame]) -> str:
+    """What a design is and gives; its limits and the parameter study of f if there are tables of them."""
+    if design.hinf:
+        said = [
+            "For the plant without its dead time",
+            f"||[W1 S; W2 T]|| = {number(design.hinf['gamma'], 4)}, no stabilising controller below "
+            f"{number(design.hinf['gamma_lower'], 4)}",
+        ]
+        if not design.blocks["K"].is_stable:
+            said.append("K itself is UNSTABLE and diverges when the actuator saturates")
+    else:
+        poles = ", ".join(number(pole.real) if not pole.imag else f"{pole:.3g}" for pole in design.blocks["T_so"].poles)
+        said = [f"With the exact dead time; poles of T_so {poles}"]
+    thesis, corrected = (design.anti_windup[kind] for kind in ("thesis", "corrected"))
+    said.append(
+        f"theta1~: alpha = {number(thesis['alpha'])} s, beta = {number(thesis['beta'])} s, gamma = "
+        f"{number(thesis['gamma'])} by (2.23), corrected with the rate {number(corrected['rate'])} 1/s"
+    )
+    if name == "extended" and "f_gamma" in tables:
+        said.append(f"The least f of (2.23) over beta is {number(only(tables['f_gamma'], 'f_best'))}")
+    if name in tables:
+        said.append(f"The thesis's reference at {number(design.reference_omega)} rad/s. {required_input(tables[name])}")
+    return ". ".join(said) + "."
+
+
+def _judgement(facts: Mapping[str, Any] | None) -> tuple[str, str, str]:
+    if facts is None:
+        return "", "", ""
+    sector = "any" if facts["popov_sector"] is None else number(facts["popov_sector"])
+    return number(facts["f"]), sector, "stable" if facts["theta2_stable"] else "NOT stable"
+
+
+def _outcome(table: pd.DataFrame, run: str) -> tuple[str, str, str]:
+    last, peak, error = (
+        of_run(table, run, column) for column in ("last_saturation_s", "peak_error_after_1s", "relative_error_percent")
+    )
+    if isnan(error):
+        return "diverges", "", ""
+    return "to the end" if isnan(last) else f"{number(last)} s", number(peak), f"{number(error)} %"

@@ -1,0 +1,366 @@
+"""The one page on a plant: what it says, that all of it is on the page, legible, and the same bytes every time."""
+
+from __future__ import annotations
+
+from itertools import combinations, pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner, Result
+from matplotlib.figure import Figure
+
+from design.block import Block
+from design.contract import Design
+from identification.files import InputError
+from identification.frequency_response import FrequencyResponse
+from identification.model import IdentifiedModel, read_model
+from identification.plant import AdditiveBound, Mode, PlantModel
+from identification.structure import Structure
+from paper_figures import style, summary_page
+from paper_figures.__main__ import main
+from paper_figures.summary import Summary, summarise
+from paper_figures.summary_of_fit import parameter_table
+
+NO_INTEGRATOR = "the plant has 0 integrators; the design expects exactly one, Eq. (2.20)"
+SIMPLE = AdditiveBound.printed_form(0.3, 40.0, 60.0, 0.2)
+RICH = AdditiveBound(0.3, (Mode(20.0, 0.4),), (Mode(15.0, 0.3), Mode(70.0, 0.2)), (40.0,), ())
+
+
+def plant_of(modes: int, integrators: int = 1, poles: int = 0) -> PlantModel:
+    return PlantModel(
+        2.0,
+        tuple(Mode(20.0 * 1.5**i, 0.05) for i in range(modes)),
+        tuple(Mode(25.0 * 1.5**i, 0.04) for i in range(modes)),
+        0.004,
+        integrators,
+        real_poles=(12.5,) * poles,
+    )
+
+
+def sweeps_of(plant: PlantModel, count: int, synthetic: bool = False) -> list[FrequencyResponse]:
+    omega = np.geomspace(5.0, 400.0, 60)
+    response = plant(1j * omega)
+    return [
+        FrequencyResponse(omega, response * (1.02 + 0.01 * i + 0.01 * np.sin(40 * omega)), None, f"day_{i}.csv")
+        if not synthetic
+        else FrequencyResponse(omega, 1.1 * response, None, f"day_{i}.csv", synthetic=True)
+        for i in range(count)
+    ]
+
+
+def facts_of(plant: PlantModel, tests: list[FrequencyResponse]) -> dict[str, Any]:
+    zeros, poles = (
+        2 * len(modes) + len(rates)
+        for modes, rates in ((plant.zero_modes, plant.real_zeros), (plant.pole_modes, plant.real_poles))
+    )
+    structure = Structure(plant.integrators, zeros, poles)
+    values = np.array([value for _, value in structure.parameters(plant)])
+
+    def share(part: float) -> dict[str, Any]:
+        return structure.to_dict(part * values)
+
+    each = {"noise": {"floor": 2e-4, "relative": 0.0125}, "chi_square": 1.02, "residual_correlation": 0.03}
+    return {
+        "structure": str(structure),
+        "synthetic": any(test.synthetic for test in tests),
+        "criterion": {
+            "name": "BIC",
+            "overdispersion": 1.0,
+            "by_structure": {str(structure): 5.0, "1 integrator": 99.0},
+        },
+        "intervals_95": {"lower": share(0.98), "upper": share(1.02)},
+        "noise_standard_errors": share(0.003),
+        "misfit_standard_errors": share(0.0),
+        "scatter_standard_errors": share(0.01) if len(tests) > 1 else None,
+        "agreement_of_tests": 1e-9 if len(tests) > 1 else None,
+        "tests": [{"name": test.name, "median_distance": 0.012, **each} for test in tests],
+        "bound": {
+            **{"order": 2, "mean_excess": 3.25, "largest_excess": 12.5, "least_excess": 11.75},
+            "touches": [{"omega": 55.5, "test": tests[0].name, "between_lines": False, "ratio": 1.0}],
+        },
+    }
+
+
+def model_of(plant: PlantModel, tests: list[FrequencyResponse], bound: AdditiveBound = SIMPLE) -> IdentifiedModel:
+    return IdentifiedModel(plant, bound, None, facts_of(plant, tests))
+
+
+def design_of(kind: str) -> Design:
+    judged = {"f": 0.0625, "popov_sector": None, "theta2_stable": False}
+    return Design(
+        kind=kind,
+        plant=plant_of(1),
+        additive_bound=SIMPLE,
+        reference_omega=1.5,
+        blocks={"K": Block(1.0, (), (1 + 0j,)), "T_so": Block(1.0, (), (-4 + 0j, -1 + 2j, -1 - 2j))},
+        hinf={"gamma": 0.375, "gamma_lower": 0.3125} if kind == "delay-free" else None,
+        anti_windup={
+            "thesis": {"alpha": 0.03, "beta": 0.02, "gamma": 48.5, **judged},
+            "corrected": {"rate": 1.75, **judged, "popov_sector": 1.0, "theta2_stable": True},
+        },
+        parameters={},
+    )
+
+
+DESIGNS: dict[str, Design | str] = {"delay_free": design_of("delay-free"), "extended": design_of("extended")}
+
+
+def outcomes() -> dict[str, pd.DataFrame | str]:
+    rows = [
+        {
+            **{
+                "run": run,
+                "limit": 6.5,
+                "required": 7.25,
+                "last_saturation_s": last,
+                "peak_error_after_1s": 4.5,
+            },
+            "relative_error_percent": error,
+        }
+        for run, last, error in (("none", np.nan, np.nan), ("thesis", np.nan, 62.5), ("corrected", 3.125, 0.75))
+    ]
+    return {
+        **dict.fromkeys(("delay_free", "extended"), pd.DataFrame(rows)),
+        "f_gamma": pd.DataFrame([{"f_best": 0.03125}]),
+    }
+
+
+def page_of(
+    plant: PlantModel, count: int, bound: AdditiveBound = SIMPLE, refused: bool = False, synthetic: bool = False
+) -> tuple[Summary, Figure]:
+    tests = sweeps_of(plant, count, synthetic)
+    model = model_of(plant, tests, bound)
+    said = (
+        summarise(model, tests, dict.fromkeys(DESIGNS, NO_INTEGRATOR), {})
+        if refused
+        else summarise(model, tests, DESIGNS, outcomes())
+    )
+    return said, summary_page.draw(said, model, tests)
+
+
+PAGES = {
+    "one test, four parameters": (plant_of(1), 1, SIMPLE, False, True),
+    "17 tests, 31 parameters": (plant_of(7, 2, 1), 17, RICH, False, False),
+    "refused": (plant_of(1, 0, 1), 3, RICH, True, False),
+    "a gain": (PlantModel(-2.0, (), (), 0.0, 0), 2, SIMPLE, True, False),
+}
+
+
+@pytest.mark.parametrize("arguments", PAGES.values(), ids=PAGES)
+def test_all_is_on_the_page_and_legible(arguments, extents):
+    said, figure = page_of(*arguments)
+    size = figure.get_size_inches()
+    assert tuple(size) == pytest.approx((8.27, 11.69))
+    figure.set_dpi(200)
+    printed = extents(figure, lambda figure: figure.texts)
+    for text, box in printed:
+        assert box.x0 > 0.6, text
+        assert box.x1 < size[0] - 0.6, text
+        assert box.y0 > 0.6, text
+        assert box.y1 < size[1] - 0.6, text
+    for (text, box), (other, beside) in combinations(printed, 2):
+        overlap = min(box.x1, beside.x1) - max(box.x0, beside.x0), min(box.y1, beside.y1) - max(box.y0, beside.y0)
+        assert min(overlap) < 0.03, (text, other)
+    assert min(text.get_fontsize() for text in figure.texts) >= 6
+    tops, bottoms = zip(*((panel.get_position().y1, panel.get_position().y0) for panel in figure.axes), strict=True)
+    assert not any(min(bottoms) * size[1] < box.y1 and box.y0 < max(tops) * size[1] for _, box in printed)
+    assert (max(tops) - min(bottoms)) * size[1] > 2.5
+    for words in (said.title, said.synthetic):
+        assert words in [text for text, _ in printed] or not words
+
+
+@pytest.mark.parametrize("arguments", PAGES.values(), ids=PAGES)
+def test_page_and_text_hold_the_same_cells(arguments):
+    said, figure = page_of(*arguments)
+    page, text = {line.get_text() for line in figure.texts}, said.text()
+    tables = [said.parameters, *([said.loops] if said.loops else [])]
+    cells = {cell for table in tables for row in table.rows for cell in row if cell}
+    assert {cell for cell in cells if "omega" not in cell} <= page
+    assert all(cell in text for cell in cells)
+    assert all(len(line) <= 140 for line in text.splitlines())
+    assert ("SYNTHETIC" in text) == any("SYNTHETIC" in line for line in page) == bool(said.synthetic)
+
+
+FULL_PAGE = """
+SYNTHETIC DATA: 2 of 2 tests
+gain K 2.000 1.960 to 2.040 0.006 0.02
+0.0500 0.0490 to 0.0510
+2 tests in day_0.csv, day_1.csv; 120 lines from 5 to 400 rad/s
+Its BIC is 94 better than that of the next best, 1 integrator.
+Student's distribution of the scatter of 2 tests
+probability below 1e-06
+noise of 1.2 % of the response
+W_a = 0.3 (1 + s/40) / (1 + 2 0.2 s/60 + (s/60)^2)
+3.25 times their envelope on average and 12.5 times at most (no bound of this order gets below 11.8)
+It touches day_0.csv at 55.5 rad/s
+= 0.375, no stabilising controller below 0.3125. K itself is UNSTABLE
+poles of T_so -1+2j, -1-2j, -4
+gamma = 48.5 by (2.23), corrected with the rate 1.75 1/s
+The least f of (2.23) over beta is 0.0312
+exceeds the limits of +-6.5
+no anti-windup diverges
+thesis's anti-windup 0.0625 any NOT stable to the end
+1 stable 3.12 s 4.5 0.75 %
+"""
+
+
+def test_numbers_and_sentences_of_a_full_page():
+    words = " ".join(page_of(plant_of(1), 2, synthetic=True)[0].text().split())
+    assert [part for part in FULL_PAGE.strip().splitlines() if part not in words] == []
+    assert "Refused" not in words
+
+
+def test_refusals_stand_in_their_place_with_what_is_not_drawn():
+    plant = plant_of(1)
+    tests = sweeps_of(plant, 1)
+    results = outcomes() | {"f_gamma": "f-gamma will not"}
+    said = summarise(model_of(plant, tests), tests, DESIGNS | {"delay_free": NO_INTEGRATOR}, results)
+    assert said.refused == (
+        ("Chapter 2", f"Refused: {NO_INTEGRATOR}. Not drawn: Fig. 2.12 to 2.14."),
+        ("Chapters 3, 4", "Refused: f-gamma will not. Not drawn: Fig. 2.10, 2.11."),
+    )
+    assert [head for head, _ in said.designs] == ["Chapter 2", "Chapters 3, 4", "Chapters 3, 4"]
+    assert said.loops is not None
+    assert all(row[0].startswith("Chapters 3, 4") for row in said.loops.rows)
+
+
+def test_nothing_tried_is_nothing_said():
+    plant = plant_of(1)
+    tests = sweeps_of(plant, 1)
+    said = summarise(model_of(plant, tests), tests, {}, {})
+    assert said.designs == said.refused == ()
+    assert said.loops is None
+    assert "how tests would differ is not known" in said.text()
+
+
+def test_what_the_fit_leaves_is_said():
+    plant = PlantModel(2.0, (), (Mode(20.0, 1.5e-5),), 0.0)
+    tests = sweeps_of(plant, 2)
+    model = model_of(plant, tests)
+    facts = dict(model.fit)
+    facts["tests"] = [entry | {"median_distance": 0.25} for entry in facts["tests"]]
+    facts["misfit_standard_errors"] = facts["noise_standard_errors"]
+    facts["agreement_of_tests"] = 0.5
+    facts["criterion"] = {"overdispersion": 19.5, "by_structure": {facts["structure"]: 5.0}}
+    mode = {"kind": "pole", "omega": 20.0, "zeta": 0.25}
+    found, missed = {"found_omega": 20.125, "found_zeta": 0.375}, {"found_omega": None, "found_zeta": None}
+    facts["subspace_check"] = [
+        {"test": "day_0.csv", "reason": None, "modes": [mode | found, mode | missed]},
+        {"test": "day_1.csv", "reason": None, "modes": [mode | found | {"found_omega": 20.5}, mode | missed]},
+        {"test": "day_2.csv", "reason": "too short", "modes": []},
+    ]
+    text = " ".join(summarise(IdentifiedModel(plant, SIMPLE, None, facts), tests, {}, {}).text().split())
+    for part in (
+        "differ by no more: tests of one plant would differ as much with a probability of 0.5",
+        "No other structure was tried. The deviance is divided by 19.5",
+        "A median distance of 25 % is more than noise",
+        "Pole mode 1 has the least damping",
+        "No dead time",
+        "the intervals are widened for it",
+        "finds 2 of their 4 modes, omega within 2.5 % and zeta within 50 % of the fit.",
+        "N4SID finds no pole of 20 rad/s (day_0.csv), pole of 20 rad/s (day_1.csv).",
+        "No answer by N4SID from day_2.csv: too short.",
+    ):
+        assert part in text, part
+
+
+def test_long_lists_of_files_are_cut():
+    plant = plant_of(1)
+    tests = sweeps_of(plant, 9)
+    text = summarise(model_of(plant, tests), tests, {}, {}).text()
+    assert "9 tests in day_0.csv, day_1.csv, ..., day_8.csv;" in text
+
+
+@pytest.mark.parametrize(
+    ("half", "shown"),
+    [(0.5, "174.00 to 175.00"), (0.0123, "174.488 to 174.512"), (60.0, "114 to 234"), (400.0, "-226 to 574")],
+)
+def test_an_interval_shows_two_digits_of_its_half_width(half, shown):
+    plant = PlantModel(174.5, (), (), 0.0, 0)
+    tests = sweeps_of(plant, 1)
+    model = model_of(plant, tests)
+    ends = {"lower": {"gain": 174.5 - half, "delay_s": 0.0}, "upper": {"gain": 174.5 + half, "delay_s": 0.0}}
+    row = parameter_table(IdentifiedModel(plant, SIMPLE, None, dict(model.fit) | {"intervals_95": ends})).rows[0]
+    assert row[2] == shown
+
+
+def test_model_of_other_tests_or_of_none_is_refused():
+    plant = plant_of(1)
+    tests = sweeps_of(plant, 2)
+    with pytest.raises(InputError, match=r"fitted to day_0.csv, day_1.csv; expected these sweeps"):
+        summarise(model_of(plant, tests), tests[:1], {}, {})
+    with pytest.raises(InputError, match="says nothing of tests; expected a model that was fitted to sweeps"):
+        summarise(read_model("implied"), tests, {}, {})
+
+
+def test_lines_are_broken_at_words_and_symbols_are_set():
+    with style.styled():
+        words = "one zeta_two.csv omega " * 20 + "$ (s/7)^2 +-3 omega."
+        broken = summary_page._broken(words, 3.0, 8.0)
+        assert " ".join(broken) == " ".join(words.split())
+        assert len(broken) > 3
+        assert all(summary_page._width(line, 8.0) <= 3.0 for line in broken)
+        assert summary_page._broken("w" * 200, 1.0, 8.0) == ["w" * 200]
+    assert summary_page._typeset("omega.csv omega, $5 +-3 omega.") == r"omega.csv $\omega$, \$5 $\pm$3 $\omega$."
+
+
+@pytest.fixture
+def build(tmp_path: Path) -> Path:
+    """A folder with a model of one sweep, its sweep and a refused design."""
+    plant = plant_of(1)
+    (test,) = sweeps_of(plant, 1)
+    rows = [f"{w:.9g},{h.real:.9g},{h.imag:.9g}" for w, h in zip(test.omega, test.response, strict=True)]
+    (tmp_path / "day_0.csv").write_text("omega,real,imag\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    (tmp_path / "model.json").write_text(model_of(plant, [test]).to_json(), encoding="utf-8")
+    (tmp_path / "results").mkdir()
+    refusal = f"Usage: design ...\n\nError: {NO_INTEGRATOR}.\n"
+    (tmp_path / "design_delay_free.refused.txt").write_text(refusal, encoding="utf-8")
+    (tmp_path / "design_extended.refused.txt").touch()
+    return tmp_path
+
+
+def summary(build: Path) -> Result:
+    return CliRunner().invoke(
+        main, ["summary", str(build / "model.json"), str(build / "day_0.csv"), "--build", str(build)]
+    )
+
+
+def test_command_reads_what_was_made_and_refused_and_writes_the_same_bytes_twice(build):
+    result = summary(build)
+    assert result.exit_code == 0, result.output
+    said = f"Chapter 2: Refused: {NO_INTEGRATOR}. Not drawn: Fig. 2.12 to 2.14."
+    assert result.output == f"1 test -> {build / 'summary.pdf'}\n{said}\n"
+    assert said in " ".join((build / "summary.txt").read_text(encoding="utf-8").split())
+    first = {path.suffix: path.read_bytes() for path in build.glob("summary.*")}
+    assert set(first) == {".pdf", ".png", ".svg", ".txt"}
+    assert summary(build).exit_code == 0
+    assert {path.suffix: path.read_bytes() for path in build.glob("summary.*")} == first
+
+
+def test_command_refuses_what_it_cannot_read(build):
+    (build / "design_extended.json").write_text(design_of("extended").to_json(), encoding="utf-8")
+    (build / "results" / "extended_summary.csv").write_text("run,limit\nnone,1\n", encoding="utf-8")
+    result = summary(build)
+    assert result.exit_code == 2
+    path = build / "results" / "extended_summary.csv"
+    assert result.output == f"Error: {path}: no column required, which summary needs\n"
+    (build / "day_0.csv").unlink()
+    assert "no such file" in summary(build).output
+    assert not list(build.glob("summary.*"))
+
+
+def test_panels_show_tests_model_and_bound():
+    _, figure = page_of(plant_of(1), 3)
+    magnitude, _, phase, relative = figure.axes
+    assert [len(panel.lines) for panel in figure.axes] == [4, 5, 4, 4]
+    assert magnitude.lines[-1].get_zorder() >= magnitude.lines[0].get_zorder()
+    ring = figure.axes[1].lines[-1]
+    assert ring.get_xdata() == pytest.approx([55.5])
+    assert ring.get_ydata() == pytest.approx(20 * np.log10(np.abs(SIMPLE(55.5j))).reshape(1))
+    assert [panel.get_xlabel() != "" for panel in figure.axes] == [False, False, True, True]
+    letters = [text.get_text() for panel in (magnitude, phase, figure.axes[1], relative) for text in panel.texts]
+    assert letters == ["(a)", "(b)", "(c)", "(d)"]
+    assert all(a < b for a, b in pairwise(letters))
