@@ -15,6 +15,7 @@ SWEEPS ?= $(sort $(wildcard data/elevation/*_frf.csv))
 FIT ?=
 OUT ?= build/refit
 LIMIT ?=
+SETS ?= 200
 REFIT :=
 
 PY := .venv/bin/python
@@ -49,7 +50,7 @@ CONTRACT := $(addprefix identification/,files.py plant.py model.py thesis.py) $(
 ENGINE := $(addprefix experiments/,__main__.py closed_loop.py taylor.py crossings.py loops.py scenarios.py metrics.py)
 TRACKING := $(ENGINE) $(addprefix experiments/,tracking.py pade.py)
 
-.PHONY: help figures refit claims test bench lint clean
+.PHONY: help figures refit claims test bench study lint clean
 help: ## say what there is
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 	@echo
@@ -72,6 +73,9 @@ test: lint ## check style, types and everything else
 
 bench: $(READY) ## measure speed as ratios against peers
 	$(PY) -m pytest -q -s benchmarks --benchmark-only --benchmark-columns=median,iqr,rounds
+
+study: $(READY) ## fit hundreds of synthetic sets: success, distance from the Cramer-Rao bound, coverage, time
+	$(PY) benchmarks/identification_study.py --sets $(SETS)
 
 lint: $(READY) ## check style and types
 	.venv/bin/ruff check --quiet .

@@ -13,7 +13,7 @@ from identification.one_test import ScaledTest
 from identification.structure import Structure, Wanted
 
 MOST_MODES = 8
-INTEGRATORS_TRIED = 2  # rows of the path in which every number of integrators is fitted
+BEHIND = 1.0  # deviance a line, behind the best number of integrators, at which another one is given up
 WHITE = 0.1  # correlation of neighbouring residuals below which nothing is left to explain
 FRUITLESS = 2  # rows of the path without a better structure after which it ends
 LEVELLED = 0.2  # of the path's largest gain, below which gains are taken for those of superfluous pairs
@@ -58,7 +58,7 @@ class Selection:
 
         Notes
         -----
-        First as many zeros as poles, pair by pair, for each number of integrators at first and then for the best;
+        First as many zeros as poles, pair by pair, for each number of integrators that is not far behind the best;
         then single steps (:func:`identification.moves.neighbours`) as long as the criterion falls.
 
         On a real rig no model leaves white residuals: every further pair of modes takes a little more of a ripple that
@@ -129,9 +129,10 @@ class Selection:
             assert leader is not None
             path.append(leader)
             self._shed(leader)
+            if len(path) > 1:
+                limit = self._deviance(leader) + BEHIND * sum(test.omega.size for test in self.tests)
+                row = [structure for structure in row if self._deviance(structure) < limit]
             integrators = [structure.integrators for structure in sorted(row, key=self._deviance)]
-            if len(path) >= INTEGRATORS_TRIED:
-                integrators = integrators[:1]
             best = min(self.fits, key=self.criterion)
             if self.wanted.admits(best):
                 fruitless = 0 if best != last else fruitless + 1
