@@ -19,7 +19,8 @@ def additive_error_tables(model: IdentifiedModel, tests: Sequence[FrequencyRespo
     -------
     dict
         ``additive_error``: test (1, 2, ...), omega in rad/s, error, bound, plant (magnitudes in the plant's
-        unit). ``additive_error_summary``: one row; lines, tests, the largest error/bound and where it is.
+        unit). ``additive_error_summary``: one row; tests, the synthetic among them, lines, the largest
+        error/bound and where it is.
     """
     frames = []
     for number, test in enumerate(tests, start=1):
@@ -40,6 +41,7 @@ def additive_error_tables(model: IdentifiedModel, tests: Sequence[FrequencyRespo
     worst = table.iloc[int((table["error"] / table["bound"]).to_numpy().argmax())]
     summary = {
         "tests": len(tests),
+        "synthetic_tests": sum(test.synthetic for test in tests),
         "lines": len(table),
         "largest_ratio": worst["error"] / worst["bound"],
         "largest_ratio_omega": worst["omega"],

@@ -25,14 +25,17 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     table, summary = tables["additive_error"], tables["additive_error_summary"]
     above = int((table["error"] > table["bound"]).sum())
     verdict = "at every line" if not above else f"but for {above} lines"
+    synthetic = int(only(summary, "synthetic_tests"))
+    origin = (
+        f" {synthetic} of the tests are SYNTHETIC, made by a program: they show that the method works and are no "
+        "evidence about any hardware. (The thesis's own records are not published.)"
+    )
     return (
         f"Additive error |P - P_test| of {only(summary, 'tests'):.0f} tests at {only(summary, 'lines'):.0f} spectral "
         "lines, the bound |W_a| of Eq. (2.21) and, for scale, |P| (thesis Fig. 2.9). The error stays below the bound "
         f"{verdict}; the largest ratio of the two is {number(only(summary, 'largest_ratio'))}, at omega = "
         f"{number(only(summary, 'largest_ratio_omega'))} rad/s. Where lines stand closer than markers, the smallest "
-        "and the largest error of each test are drawn. The thesis's own records are not published. Those that are "
-        "shipped with this project are synthetic, made by a program around the parameters that the thesis's "
-        "transfer functions imply: they show that the method works and are no evidence about the antenna."
+        f"and the largest error of each test are drawn.{origin if synthetic else ''}"
     )
 
 

@@ -44,7 +44,8 @@ def additive_error_tables(tests: int = 3) -> Tables:
         pd.DataFrame({"test": test, "omega": omega, "error": test / omega, "bound": omega / 10, "plant": 5 / omega})
         for test in range(1, tests + 1)
     ]
-    summary = {"tests": tests, "lines": 60 * tests, "largest_ratio": 0.375, "largest_ratio_omega": 54.5}
+    summary = {"tests": tests, "synthetic_tests": 2, "lines": 60 * tests}
+    summary |= {"largest_ratio": 0.375, "largest_ratio_omega": 54.5}
     return {"additive_error": pd.concat(rows, ignore_index=True), "additive_error_summary": pd.DataFrame([summary])}
 
 
@@ -269,7 +270,9 @@ def test_caption_counts_the_lines_above_the_bound(above):
     tables["additive_error"].loc[: above - 1, "error"] = 1e6
     caption = figure_module("fig_2_09").caption(tables)
     assert ("at every line" if above == 0 else "but for 2 lines") in caption
-    assert "synthetic" in caption
+    assert "2 of the tests are SYNTHETIC" in caption
+    tables["additive_error_summary"]["synthetic_tests"] = 0
+    assert "SYNTHETIC" not in figure_module("fig_2_09").caption(tables)
 
 
 @pytest.mark.parametrize(
@@ -301,7 +304,7 @@ SAID = {
     "fig_2_02": ["overshoot_swapped_none", "step", "limit"],
     "fig_2_03": ["overshoot_swapped_back_calculation", "overshoot_printed_back_calculation", "back_calculation"],
     "fig_2_04": ["overshoot_swapped_none", "overshoot_swapped_back_calculation"],
-    "fig_2_09": ["tests", "lines", "largest_ratio", "largest_ratio_omega"],
+    "fig_2_09": ["tests", "synthetic_tests", "lines", "largest_ratio", "largest_ratio_omega"],
     "fig_2_10": ["alpha", "beta", "beta_best", "gamma_best", "f_best"],
     "fig_2_11": ["beta", "gamma", "f", "beta_best", "gamma_best", "f_best"],
     "fig_2_12": ["limit", "required", "offset", "ripple", "relative_error_percent"],
