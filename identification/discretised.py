@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import expm
+from scipy.linalg import eigvals, expm
 
 from identification.files import InputError
 from identification.plant import Mode, PlantModel
@@ -94,15 +94,12 @@ def pulse_response(plant: PlantModel, sampling_s: float, omega: ArrayLike) -> Co
     Appl. 31 (2009) 970-989, for the triangular exponential.
     """
     theta = _angle(sampling_s, omega)
-    generator, output = _chain(plant, sampling_s)
-    transition = _triangular_exponential(generator)
+    generator, _ = _chain(plant, sampling_s)
+    transition, sampled, whole = _discretised(plant, sampling_s)
     shift = np.expm1(1j * theta)
     states = np.ones((len(generator), theta.size), dtype=complex)
     for i, pole in enumerate(np.diag(generator)[1:], 1):
         states[i] = np.einsum("j,jm->m", transition[i, :i], states[:i]) / (shift - np.expm1(pole))
-    delay = plant.delay_s / sampling_s
-    whole = round(delay) if abs(delay - round(delay)) < WHOLE else math.ceil(delay)
-    sampled = output @ _triangular_exponential(generator * max(0.0, whole - delay))
     return np.einsum("j,jm->m", sampled, states) * np.exp(-1j * theta * whole)
 
 
@@ -114,6 +111,39 @@ def aliases(plant: PlantModel, sampling_s: float, omega: ArrayLike) -> Complex:
     """
     frequency = np.asarray(omega, dtype=float)
     return pulse_response(plant, sampling_s, frequency) / hold(frequency, sampling_s) - plant(1j * frequency)
+
+
+def pulse_zeros(plant: PlantModel, sampling_s: float) -> Complex:
+    """Zeros z of the pulse transfer function, without those of its delay, each as log(z)/T.
+
+    Parameters
+    ----------
+    plant, sampling_s
+        As for :func:`pulse_response`.
+
+    Returns
+    -------
+    Complex
+        (K,) rad/s, in no order. Among them are the images of the plant's own zeros, near them if those are slow;
+        there is no closed form as there is for poles, whose images are the poles.
+
+    Raises
+    ------
+    InputError
+        The interval is not positive.
+
+    References
+    ----------
+    Astrom, Hagander, Sternby, "Zeros of sampled systems", Automatica 20 (1984) 31-38.
+    """
+    _positive_interval(sampling_s)
+    transition, sampled, _ = _discretised(plant, sampling_s)
+    order = len(transition) - 1
+    # The input's state first: u is what makes x[k+1] = z x[k] and y[k] = 0.
+    system = np.concatenate([transition[1:], sampled[None]])
+    z = eigvals(np.roll(system, -1, axis=1), np.diag([1.0] * order + [0.0]))
+    z = z[np.isfinite(z) & (z != 0)]
+    return np.asarray(np.log(z) / sampling_s)
 
 
 def _positive_interval(sampling_s: float) -> None:
@@ -132,6 +162,15 @@ def _angle(sampling_s: float, omega: ArrayLike) -> Real:
             f"frequency, {np.pi / sampling_s:g} rad/s"
         )
     return theta
+
+
+def _discretised(plant: PlantModel, sampling_s: float) -> tuple[Complex, Complex, int]:
+    """exp(A) of w = (u, x), c exp(A e) and d: see :func:`pulse_response`."""
+    generator, output = _chain(plant, sampling_s)
+    delay = plant.delay_s / sampling_s
+    whole = round(delay) if abs(delay - round(delay)) < WHOLE else math.ceil(delay)
+    sampled = output @ _triangular_exponential(generator * max(0.0, whole - delay))
+    return _triangular_exponential(generator), np.asarray(sampled), whole
 
 
 def _chain(plant: PlantModel, sampling_s: float) -> tuple[Complex, Complex]:
