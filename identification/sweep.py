@@ -39,7 +39,7 @@ WEAKEST = 4.0  # lines whose variance is this much over the median's carry littl
 
 @dataclass(frozen=True)
 class SweepEstimate:
-    """A response at M lines whose errors are independent.
+    """A response at M lines whose errors are independent; within a window that takes a pole they correlate by 0.3.
 
     Parameters
     ----------
