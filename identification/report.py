@@ -104,7 +104,8 @@ def bound_text(bound: AdditiveBound) -> str:
         return " ".join(factors)
 
     zeros, poles = product(bound.zero_modes, bound.real_zeros), product(bound.pole_modes, bound.real_poles)
-    return f"W_a = {bound.gain:.4g} {zeros}".rstrip() + f" / {poles}"
+    several = len(bound.pole_modes) + len(bound.real_poles) > 1
+    return f"W_a = {bound.gain:.4g} {zeros}".rstrip() + (f" / [{poles}]" if several else f" / {poles}")
 
 
 def bound_remarks(report: BoundReport) -> list[str]:
