@@ -89,10 +89,6 @@ class Nominal:
         ends = [self._physical(self.theta + side * self.half_widths) for side in (-1, 1)]
         return (ends[0], ends[1]) if self.sign > 0 else (self._swapped(ends[0], ends[1]))
 
-    def in_physical_units(self, errors: Real) -> Real:
-        """Standard errors (p,) of theta as standard errors of the parameters themselves."""
-        return errors * np.append(np.exp(self.theta[:-1]), 1.0)
-
     def _physical(self, theta: Real) -> Real:
         values = np.append(np.exp(theta[:-1]), max(0.0, theta[-1]))
         values[0] *= self.sign

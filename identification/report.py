@@ -11,8 +11,9 @@ from identification.fit import FitResult
 from identification.frequency_response import FrequencyResponse
 from identification.model import plant_to_dict
 from identification.one_test import OneFit
-from identification.plant import AdditiveBound, Mode
+from identification.plant import AdditiveBound, Mode, PlantModel
 from identification.start import BOUNDS
+from identification.structure import in_physical_units
 from identification.subspace import SubspaceCheck
 from identification.uncertainty import BoundReport
 
@@ -22,20 +23,23 @@ POOR = 0.15  # median distance of a test from its own fit
 
 def standard_errors(result: FitResult) -> dict[str, Any]:
     """The standard errors of the nominal plant in the shape and units of model.json's ``plant``."""
-    return result.structure.to_dict(result.nominal.in_physical_units(result.nominal.errors))
+    return result.structure.to_dict(in_physical_units(result.nominal.theta, result.nominal.errors))
 
 
 def fit_to_dict(result: FitResult) -> dict[str, Any]:
     """The facts of a fit that model.json records."""
     lower, upper = result.nominal.intervals
     shaped = result.structure.to_dict
+    how = (
+        "each test on its own; mean of the logarithms, mean delay" if result.nominal.scattered else "one plant for all"
+    )
 
     def errors(theta: Any) -> dict[str, Any] | None:
-        return None if theta is None else shaped(result.nominal.in_physical_units(theta))
+        return None if theta is None else shaped(in_physical_units(result.nominal.theta, theta))
 
     return {
         "structure": str(result.structure),
-        "method": "maximum likelihood, each test on its own; mean of the logarithms, mean delay",
+        "method": f"maximum likelihood, {how}",
         "loss": "soft-L1" if result.soft else "least squares",
         "criterion": {
             "name": "BIC",
@@ -52,12 +56,11 @@ def fit_to_dict(result: FitResult) -> dict[str, Any]:
 
 
 def _test_to_dict(test: OneFit) -> dict[str, Any]:
-    units = [1.0 if name.startswith("delay") else abs(value) for name, value in test.structure.parameters(test.plant)]
     return {
         "name": test.name,
         "lines": test.lines,
         "plant": plant_to_dict(test.plant),
-        "standard_errors": test.structure.to_dict(test.errors * units),
+        "standard_errors": test.structure.to_dict(in_physical_units(test.theta, test.errors)),
         "noise": {"floor": test.floor, "relative": test.relative},
         "chi_square": test.chi_square,
         "residual_correlation": test.correlation,
@@ -125,8 +128,10 @@ def parameter_rows(result: FitResult) -> list[tuple[str, float, float, float, fl
     The last two are standard errors; the scatter's is None for one test. The noise's contains the misfit.
     """
     lower, upper = result.nominal.intervals
-    noise = result.nominal.in_physical_units((result.nominal.noise**2 + result.nominal.misfit**2) ** 0.5)
-    scatter = None if result.nominal.scatter is None else result.nominal.in_physical_units(result.nominal.scatter)
+    noise = in_physical_units(result.nominal.theta, (result.nominal.noise**2 + result.nominal.misfit**2) ** 0.5)
+    scatter = (
+        None if result.nominal.scatter is None else in_physical_units(result.nominal.theta, result.nominal.scatter)
+    )
     return [
         (
             label,
@@ -161,16 +166,30 @@ def remarks(result: FitResult) -> list[str]:
             f"the residuals never become noise, whatever the number of modes: their deviance is divided by "
             f"{result.overdispersion:.3g} in the choice of the structure"
         )
-    if distance > 100 * POOR:
-        said.append(f"a poor fit: a distance above {100 * POOR:g} % is more than noise leaves on a plant of this class")
-    for kind, modes in (("zero", result.plant.zero_modes), ("pole", result.plant.pole_modes)):
+    return said + cautions(result.plant, distance / 100)
+
+
+def cautions(plant: PlantModel, distance: float) -> list[str]:
+    """Sentences on what in a plant is at the edge of what can be said.
+
+    Parameters
+    ----------
+    plant
+        The nominal plant.
+    distance
+        The largest of the tests' median distances from their own fits, over the response.
+    """
+    said = []
+    if distance > POOR:
+        said.append(f"a median distance of {100 * distance:.2g} % is more than noise leaves on a plant of this class")
+    for kind, modes in (("zero", plant.zero_modes), ("pole", plant.pole_modes)):
         for i, mode in enumerate(modes, 1):
             if mode.zeta < 2 * BOUNDS[0]:
                 said.append(
-                    f"{kind} mode {i} wants less damping than the least that is sought: a {kind} in the right half "
+                    f"{kind} mode {i} has the least damping that is sought: a {kind} in the right half "
                     "plane, which this class does not have, or one narrower than the lines lie apart"
                 )
-    if result.plant.delay_s == 0:
+    if plant.delay_s == 0:
         said.append("no dead time can be told from none")
     return said
 

@@ -120,6 +120,11 @@ class Structure:
         }
 
 
+def in_physical_units(theta: Real, errors: Real) -> Real:
+    """Standard errors (p,) of theta, all logarithms but the delay, as those of the parameters themselves."""
+    return np.asarray(errors * np.append(np.exp(theta[:-1]), 1.0))
+
+
 @dataclass(frozen=True)
 class Wanted:
     """The structures that the user admits: None leaves a number to the data.

@@ -12,8 +12,7 @@ from identification.files import InputError
 from identification.frequency_response import FrequencyResponse
 from identification.model import IdentifiedModel, plant_to_dict
 from identification.nominal import ONE_PLANT
-from identification.report import POOR, bound_text
-from identification.start import BOUNDS
+from identification.report import bound_text, cautions
 from paper_figures.captions import number
 
 Paragraph = tuple[str, str]
@@ -202,16 +201,9 @@ def _checks(checks: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             yield f"No answer by N4SID from {_few(names)}: {reason}."
 
 
-def _cautions(model: IdentifiedModel) -> Iterator[str]:
+def _cautions(model: IdentifiedModel) -> list[str]:
     distance = max(fact(test, "median_distance") for test in fact(model.fit, "tests"))
-    if distance > POOR:
-        yield f"A median distance of {number(100 * distance, 2)} % is more than noise leaves on a plant of this class."
-    for kind, modes in (("Zero", model.plant.zero_modes), ("Pole", model.plant.pole_modes)):
-        for i, mode in enumerate(modes, 1):
-            if mode.zeta < 2 * BOUNDS[0]:
-                yield f"{kind} mode {i} has the least damping that is sought, or belongs in the right half plane."
-    if model.plant.delay_s == 0:
-        yield "No dead time can be told from none."
+    return [f"{said[0].upper()}{said[1:]}." for said in cautions(model.plant, distance)]
 
 
 def _bound(model: IdentifiedModel) -> str:
