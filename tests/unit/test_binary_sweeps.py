@@ -12,29 +12,18 @@ import pyuff
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
+from sweep_columns import COLUMNS as SHARED
+from sweep_columns import FREQUENCY_HZ, RESPONSE
 
 from identification.files import InputError
 from identification.frequency_response import FrequencyResponse, read_sweeps
 
-FREQUENCY_HZ = np.arange(1.0, 11.0)
-RESPONSE = 10 ** (-FREQUENCY_HZ / 20) * np.exp(1j * np.radians(10 * FREQUENCY_HZ))
 COHERENCE = 1 - FREQUENCY_HZ / 100
 TIME_S = np.arange(200) / 128
 SWEEP = np.sin(np.arange(200.0) ** 2 / 500)
 NOISE = np.random.default_rng(0).standard_normal(200)
 
-COLUMNS = {
-    "frequency_hz": FREQUENCY_HZ,
-    "omega": 2 * np.pi * FREQUENCY_HZ,
-    "magnitude_db": 20 * np.log10(np.abs(RESPONSE)),
-    "magnitude": np.abs(RESPONSE),
-    "phase_deg": np.degrees(np.angle(RESPONSE)),
-    "phase_rad": np.angle(RESPONSE),
-    "real": RESPONSE.real,
-    "imag": RESPONSE.imag,
-    "response": RESPONSE,
-    "coherence": COHERENCE,
-}
+COLUMNS = SHARED | {"response": RESPONSE, "coherence": COHERENCE}
 
 
 def _only_test(path: Path) -> FrequencyResponse:

@@ -10,27 +10,15 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from sweep_columns import COLUMNS, FREQUENCY_HZ, RESPONSE
 
 from identification.files import InputError
 from identification.frequency_response import FrequencyResponse, input_files, read_sweeps
 from identification.thesis import DATA
 
-FREQUENCY_HZ = np.arange(1.0, 11.0)
-RESPONSE = 10 ** (-FREQUENCY_HZ / 20) * np.exp(1j * np.radians(10 * FREQUENCY_HZ))
 FRF = ["frequency_hz,magnitude_db,phase_deg,coherence"] + [f"{f},{-f},{10 * f},0.9" for f in range(1, 11)]
 RAW = ["time_s,input,output"] + [f"{0.01 * k:.4f},{np.sin(k * k / 500):.6f},{np.sin(k):.6f}" for k in range(200)]
 TWO = ["test,frequency_hz,real,imag"] + [f"{t},{f},7,{f}" for t in (7, "b") for f in range(1, 9)]
-
-COLUMNS = {
-    "frequency_hz": FREQUENCY_HZ,
-    "omega": 2 * np.pi * FREQUENCY_HZ,
-    "magnitude_db": 20 * np.log10(np.abs(RESPONSE)),
-    "magnitude": np.abs(RESPONSE),
-    "phase_deg": np.degrees(np.angle(RESPONSE)),
-    "phase_rad": np.angle(RESPONSE),
-    "real": RESPONSE.real,
-    "imag": RESPONSE.imag,
-}
 UNITS = [
     *(
         [f, m, p]
