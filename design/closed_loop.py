@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import eigvals
+from scipy.linalg import block_diag, eigvals
 
 from design.block import Block, geometric_scale
 from design.frequency import peak
 from design.realization import realize
+from identification.files import InputError
 
 
 def closed_loop_norm(G: Block, W1: Block, W2: Block, K: Block) -> float:
@@ -24,14 +25,20 @@ def closed_loop_norm(G: Block, W1: Block, W2: Block, K: Block) -> float:
 
 
 def closed_loop_poles(G: Block, K: Block) -> tuple[complex, ...]:
-    """Roots in rad/s of 1 + G K, including what cancels between the factors (internal stability)."""
+    """Roots in rad/s of 1 + G K, including what cancels between the factors (internal stability).
+
+    Raises
+    ------
+    InputError
+        1 + G K vanishes at infinite frequency: the loop is not well posed.
+    """
     q = geometric_scale(G, K)
     g, k = realize(G), realize(K)
-    # u = K e, e = -(C_g x_g + d_g u): with K strictly proper no algebraic loop
-    A = np.block(
-        [
-            [g.A, np.outer(g.b, k.C[0])],
-            [-np.outer(k.b, g.C[0]), k.A - g.d[0] * np.outer(k.b, k.C[0])],
-        ]
-    )
+    through = 1 + g.d[0] * k.d[0]
+    if through == 0:
+        raise InputError("1 + G K is zero at infinite frequency: the loop is not well posed")
+    # e = -(C_g x_g + d_g u), u = C_k x_k + d_k e
+    e = -np.concatenate([g.C[0], g.d[0] * k.C[0]]) / through
+    u = np.concatenate([-k.d[0] * g.C[0], k.C[0]]) / through
+    A = block_diag(g.A, k.A) + np.vstack([np.outer(g.b, u), np.outer(k.b, e)])
     return tuple(complex(pole) for pole in eigvals(A / q) * q)

@@ -2,80 +2,200 @@
 
 from __future__ import annotations
 
+import re
+
 import control
 import numpy as np
 import pytest
+from scipy.linalg import block_diag, eigvals
 
+import design.mixed_sensitivity as mixed_sensitivity_module
+from design import riccati
 from design.block import Block, bound_block
-from design.closed_loop import closed_loop_poles
+from design.closed_loop import closed_loop_norm, closed_loop_poles
 from design.contract import Design
 from design.frequency import peak
-from design.mixed_sensitivity import mixed_sensitivity
+from design.mixed_sensitivity import generalised_plant, mixed_sensitivity
 from design.realization import realize
+from design.riccati import SynthesisError, hamiltonian
 from identification.files import InputError
 
 DECAY = 1e-3  # nearly (2.8) itself
 
 
-def to_control(block: Block) -> control.StateSpace:
-    system = realize(block)
-    return control.ss(system.A, system.b[:, None], system.C, system.d[:, None])
+PROBLEMS = {
+    "unstable": (Block(1.0, (-4.0,), (-1.0, 2.0)), Block(1.0, (), (-0.1,)), Block(0.3, (-5.0,))),
+    "biproper": (Block(1.0, (-4.0, -5.0), (-1.0, -2.0)), Block(1.0, (), (-0.1,)), Block(0.3, (-5.0,), (-10.0,))),
+    "nonminimum phase, biproper W1": (
+        Block(3.0, (1.0,), (-2.0, -0.5)),
+        Block(0.5, (-2.0,), (-0.01,)),
+        Block(0.1, (-3.0,)),
+    ),
+    "all biproper": (Block(2.0, (4.0,), (1.0,)), Block(0.5, (-2.0,), (-0.1,)), Block(0.8, (-1.0,), (-20.0,))),
+}
 
 
-def test_optimum_that_the_weights_at_dc_dictate() -> None:
-    # G stable and minimum phase: S + T = 1 bounds the norm below by |W1 W2|/sqrt(|W1|^2 + |W2|^2) at every
-    # frequency; here the bound peaks at omega = 0, where W1 = 10 and W2 = 8
-    G, W1, W2 = Block(1.0, (), (-1.0, -3.0)), Block(1.0, (), (-0.1,)), Block(0.2, (-5.0, -8.0))
-    found = mixed_sensitivity(G, W1, W2, DECAY)
-    assert found.gamma_line_lower == pytest.approx(80 / np.hypot(10, 8), rel=0.02)
-    assert found.gamma_lower <= 80 / np.hypot(10, 8) * (1 + 1e-3) <= found.gamma * (1 + 1e-3)
+def closed_loop(G: Block, W1: Block, W2: Block, K: Block) -> control.StateSpace:
+    """r -> (W1 e, W2 y), e = r - y, in one state space, with no hidden copies of a factor."""
+    g, k, w = realize(G, W2 * G), realize(K), realize(W1)
+    C, d, through = g.C, g.d, 1 + g.d[0] * k.d[0]
+    zero = np.zeros(len(w.b))
+    e = -np.concatenate([C[0], d[0] * k.C[0], zero]) / through  # e = e x + r/through
+    u = np.concatenate([np.zeros(len(g.b)), k.C[0], zero]) + k.d[0] * e
+    b = np.concatenate([g.b * k.d[0], k.b, w.b]) / through
+    A = block_diag(g.A, k.A, w.A) + np.vstack([np.outer(g.b, u), np.outer(k.b, e), np.outer(w.b, e)])
+    first = np.concatenate([np.zeros(len(g.b) + len(k.b)), w.C[0]]) + w.d[0] * e
+    second = np.concatenate([C[1], np.zeros(len(k.b) + len(w.b))]) + d[1] * u
+    direct = np.array([[w.d[0]], [d[1] * k.d[0]]]) / through
+    return control.ss(A, b[:, None], np.vstack([first, second]), direct)
 
 
-def test_unstable_plant_with_constant_weights() -> None:
-    # one unstable pole p: T(p) = 1, so that with W1 = 0+ the optimum is |W2(p)|: T = W2(p)/W2 is all-pass in W2 T
-    p = 2.0
-    G, W2 = Block(1.0, (), (p,)), Block(0.5, (-4.0,))
-    found = mixed_sensitivity(G, Block(1e-4, (), (-1.0,)), W2, DECAY)
-    assert found.gamma_line_lower == pytest.approx(abs(complex(W2(p))), rel=0.01)
+def augmented_plant(G: Block, W1: Block, W2: Block) -> control.StateSpace:
+    """(r, u) -> (W1 e, W2 y, e), for slycot."""
+    g, w = realize(G, W2 * G), realize(W1)
+    n, m = len(g.b), len(w.b)
+    A = np.block([[g.A, np.zeros((n, m))], [-np.outer(w.b, g.C[0]), w.A]])
+    B = np.block([[np.zeros((n, 1)), g.b[:, None]], [w.b[:, None], -g.d[0] * w.b[:, None]]])
+    C = np.block([[-w.d[0] * g.C[:1], w.C], [g.C[1:], np.zeros((1, m))], [-g.C[:1], np.zeros((1, m))]])
+    D = np.array([[w.d[0], -w.d[0] * g.d[0]], [0.0, g.d[1]], [1.0, -g.d[0]]])
+    return control.ss(A, B, C, D)
 
 
-@pytest.mark.parametrize(
-    ("G", "W1", "W2"),
-    [
-        (Block(1.0, (-4.0,), (-1.0, 2.0)), Block(1.0, (), (-0.1,)), Block(0.3, (-5.0,))),
-        (Block(1.0, (-4.0, -5.0), (-1.0, -2.0)), Block(1.0, (), (-0.1,)), Block(0.3, (-5.0,), (-10.0,))),
-        (Block(3.0, (1.0,), (-2.0, -0.5)), Block(0.5, (-2.0,), (-0.01,)), Block(0.1, (-3.0,))),
-    ],
-    ids=["unstable", "biproper", "nonminimum phase, biproper W1"],
-)
-def test_norm_agrees_with_the_hamiltonian_method(G: Block, W1: Block, W2: Block) -> None:
-    found = mixed_sensitivity(G, W1, W2, DECAY)
-    K, T = to_control(found.K), to_control(G)
-    S = control.feedback(control.ss([], [], [], [[1.0]]), T * K)
-    rows = control.append(to_control(W1), to_control(W2 * G)) * control.ss(*control.ssdata(control.append(S, K * S)))
-    stacked = rows * control.ss([], [], [], [[1.0], [1.0]])
-    second, _ = control.linfnorm(stacked)
-    assert found.gamma == pytest.approx(second, rel=1e-4)
+def hamiltonian_norm(system: control.StateSpace) -> float:
+    """The H-infinity norm by bisection: up to it, and no further, the Hamiltonian has eigenvalues on the axis."""
+    A, B, C, D = (np.asarray(part) for part in (system.A, system.B, system.C, system.D))
+
+    def below(gamma: float) -> bool:
+        R = gamma**2 - float((D.T @ D).item())
+        F = A + B @ D.T @ C / R
+        values = eigvals(np.block([[F, B @ B.T / R], [-C.T @ (np.eye(2) + D @ D.T / R) @ C, -F.T]]))
+        return bool(np.any(np.abs(values.real) < 1e-8 * np.abs(values)))
+
+    low, high = np.linalg.norm(D) * (1 + 1e-9) + 1e-9, 1e3
+    while high > (1 + 1e-7) * low:
+        middle = np.sqrt(low * high)
+        low, high = (middle, high) if below(middle) else (low, middle)
+    return float(low)
+
+
+@pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS)
+@pytest.mark.parametrize("decay_rate", [0.0, 1e-3])
+def test_norm_agrees_with_the_hamiltonian_method(problem: tuple[Block, Block, Block], decay_rate: float) -> None:
+    found = mixed_sensitivity(*problem, decay_rate)
+    system = closed_loop(*problem, found.K)
+    assert found.gamma == pytest.approx(hamiltonian_norm(system), rel=1e-5)  # of a peak at omega = 0 to the root of eps
+    assert found.gamma == pytest.approx(control.linfnorm(system)[0], rel=1e-9)
     assert found.gamma_lower <= found.gamma
-    assert found.gamma_line_lower <= found.gamma_line <= 1.02 * found.gamma_line_lower
-    assert max(pole.real for pole in found.closed_loop_poles) < -DECAY * (1 - 1e-3)
+    assert found.gamma_line_lower <= found.gamma_line <= 1.012 * found.gamma_line_lower
+    poles = system.poles()
+    assert all(np.min(np.abs(poles - pole)) < 1e-5 * abs(pole) for pole in found.closed_loop_poles)
+    assert max(pole.real for pole in found.closed_loop_poles) < -decay_rate * (1 - 1e-3)
 
 
-def test_slycot_does_no_better_than_the_lower_bound() -> None:
-    # an ordinary problem, on which sb10ad works
-    G, W1, W2 = Block(2.0, (), (-1.0, -2.0)), Block(0.5, (-3.0,), (-0.05,)), Block(0.05, (-10.0, -20.0))
-    found = mixed_sensitivity(G, W1, W2, DECAY)
-    # z = (W1 (r - y), W2 y), e = r - y, with W2 y = (W2 G) u realised jointly
-    joint = realize(G, W2 * G)
-    w1 = to_control(W1)
-    n, m = len(joint.b), w1.nstates
-    A = np.block([[joint.A, np.zeros((n, m))], [-w1.B @ joint.C[:1], w1.A]])
-    B = np.block([[np.zeros((n, 1)), joint.b[:, None]], [w1.B, np.zeros((m, 1))]])
-    C = np.block([[-w1.D @ joint.C[:1], w1.C], [joint.C[1:], np.zeros((1, m))], [-joint.C[:1], np.zeros((1, m))]])
-    D = np.array([[w1.D.item(), 0.0], [0.0, joint.d[1]], [1.0, 0.0]])
-    _, _, gamma, _ = control.hinfsyn(control.ss(A, B, C, D), 1, 1)
-    assert found.gamma_lower <= gamma * 1.001
-    assert found.gamma_line_lower == pytest.approx(gamma, rel=0.02)
+def test_norm_of_chapter_two_agrees_with_the_hamiltonian_method(delay_free_design: Design) -> None:
+    hinf, blocks = delay_free_design.hinf, delay_free_design.blocks
+    assert hinf is not None
+    system = closed_loop(blocks["G_A"], hinf["W1"], hinf["W2"], blocks["K"])
+    assert hinf["gamma"] == pytest.approx(hamiltonian_norm(system), rel=1e-5)
+    assert hinf["gamma"] == pytest.approx(control.linfnorm(system)[0], rel=1e-5)
+
+
+def test_closed_loop_poles_with_an_algebraic_loop() -> None:
+    # 1 + 6 (s + 2)(s + 4)/((s - 1)(s + 3)) = 0
+    poles = closed_loop_poles(Block(2.0, (-2.0,), (1.0,)), Block(3.0, (-4.0,), (-3.0,)))
+    np.testing.assert_allclose(np.sort_complex(poles), np.sort_complex(np.roots([7, 38, 45])), rtol=1e-12)
+    with pytest.raises(InputError, match="not well posed"):
+        closed_loop_poles(Block(2.0, (-2.0,), (1.0,)), Block(-0.5, (-4.0,), (-3.0,)))
+
+
+@pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS)
+def test_eigenvalues_on_the_axis_are_what_the_weights_alone_cost(problem: tuple[Block, Block, Block]) -> None:
+    """|W1 W2|/sqrt(|W1|^2 + |W2|^2) at its highest, computed from the weights, and the Hamiltonian of X agree."""
+    plant, _ = generalised_plant(*problem)
+    omega = np.geomspace(1e-4, 1e4, 100_001)
+    first, second = np.abs(problem[1](1j * omega)), np.abs(problem[2](1j * omega))
+    least = float(np.max(first * second / np.hypot(first, second)))
+    assert plant.floor.gamma >= least * (1 - 1e-6)
+    direct = abs(float(plant.D11[0, 0]))
+
+    def on_axis(gamma: float) -> bool:
+        values = eigvals(hamiltonian(plant, gamma))
+        return bool(np.any(np.abs(values.real) < 1e-9 * np.abs(values)))
+
+    assert not on_axis(least * 1.001)
+    assert least <= direct * 1.001 or on_axis(least * 0.999)
+
+
+def test_what_infinite_frequency_costs() -> None:
+    found = mixed_sensitivity(Block(1.0, (-2.0,), (-1.0,)), Block(2.0, (-0.1,), (-1.0,)), Block(1.0), 0.0)
+    assert found.gamma_lower == pytest.approx(2 / np.sqrt(5), rel=1e-4)
+    assert found.reason == "S + T = 1 at infinite frequency costs 0.894427"
+
+
+def test_the_margin_of_the_failing_test_is_said(delay_free_design: Design) -> None:
+    hinf = delay_free_design.hinf
+    assert hinf is not None
+    found = mixed_sensitivity(delay_free_design.blocks["G_A"], hinf["W1"], hinf["W2"], hinf["decay_rate"])
+    ratio = re.fullmatch(r"spectral radius of X Y is (\S+) gamma\^2", found.line_reason)
+    assert ratio is not None
+    assert 1 < float(ratio[1]) < 1.01
+    value = re.fullmatch(r"no state feedback reaches it, its X has the eigenvalue (\S+)", found.reason)
+    assert value is not None
+    assert float(value[1]) < 0
+
+
+def test_a_solver_that_fails_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = PROBLEMS["unstable"]
+    found = mixed_sensitivity(*problem, 0.0)
+    whole = riccati._riccati
+
+    def blind(H: np.ndarray, rounding: float, gamma: float) -> tuple[np.ndarray, np.ndarray] | None:
+        return None if below * found.gamma_lower < gamma <= found.gamma_lower else whole(H, rounding)
+
+    # the solver sees no gamma from just below the optimum down to a fraction of it
+    seen: list[float] = []
+    monkeypatch.setattr(riccati, "hamiltonian", lambda plant, gamma: seen.append(gamma) or hamiltonian(plant, gamma))
+    monkeypatch.setattr(riccati, "_riccati", lambda H, rounding: blind(H, rounding, seen[-1]))
+    below = 0.995
+    shifted = mixed_sensitivity(*problem, 0.0)
+    assert 0.98 * found.gamma_lower < shifted.gamma_lower <= below * found.gamma_lower
+    assert shifted.gamma == found.gamma
+    below = 0.9
+    with pytest.raises(SynthesisError, match="rounding hides"):
+        mixed_sensitivity(*problem, 0.0)
+    monkeypatch.setattr(riccati, "_riccati", lambda H, rounding: None)
+    with pytest.raises(SynthesisError, match="no feasible gamma"):
+        mixed_sensitivity(*problem, 0.0)
+
+
+@pytest.mark.parametrize("factor", [0.5, 4.0])
+def test_a_wrong_riccati_solution_is_found_out(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
+    whole = riccati._riccati
+
+    def wrong(H: np.ndarray, rounding: float) -> tuple[np.ndarray, np.ndarray] | None:
+        solution = whole(H, rounding)
+        return solution and (factor * solution[0], solution[1])
+
+    monkeypatch.setattr(riccati, "_riccati", wrong)
+    with pytest.raises(SynthesisError, match="where the Riccati equations claim"):
+        mixed_sensitivity(*PROBLEMS["unstable"], 0.0)
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.012])
+def test_a_norm_that_differs_from_the_claim_is_refused(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
+    monkeypatch.setattr(
+        mixed_sensitivity_module, "closed_loop_norm", lambda *blocks: factor * closed_loop_norm(*blocks)
+    )
+    with pytest.raises(SynthesisError, match="where the Riccati equations claim"):
+        mixed_sensitivity(*PROBLEMS["unstable"], 0.0)
+
+
+@pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS)
+def test_slycot_finds_the_same_optimum(problem: tuple[Block, Block, Block]) -> None:
+    # ordinary problems, on which sb10ad works
+    found = mixed_sensitivity(*problem, 0.0)
+    _, _, gamma, _ = control.hinfsyn(augmented_plant(*problem), 1, 1)
+    assert found.gamma_lower <= gamma <= 1.0002 * found.gamma_lower
 
 
 def test_chapter_two_is_confirmed_by_its_own_closed_loop(delay_free_design: Design) -> None:
@@ -108,10 +228,25 @@ def test_second_weight_is_the_additive_bound_on_control_sensitivity(delay_free_d
 
 
 def test_weights_that_do_not_fit_are_refused() -> None:
-    G = Block(1.0, (), (-1.0,))
-    with pytest.raises(InputError, match="biproper"):
-        mixed_sensitivity(G, Block(1.0, (), (-1.0,)), Block(1.0), 0.1)
-    with pytest.raises(InputError, match="left of"):
-        mixed_sensitivity(G, Block(1.0, (), (-0.05,)), Block(1.0, (-5.0,)), 0.1)
-    with pytest.raises(InputError, match="decay rate"):
-        mixed_sensitivity(G, Block(1.0, (), (-1.0,)), Block(1.0, (-5.0,)), 0.0)
+    G, W1, W2 = Block(1.0, (), (-1.0,)), Block(1.0, (), (-1.0,)), Block(1.0, (-5.0,))
+    for problem, decay_rate, message in [
+        ((G, W1, Block(1.0)), 0.1, "biproper"),
+        ((G, Block(1.0, (-1.0,)), W2), 0.1, "proper W1"),
+        ((G, Block(1.0, (), (-0.05,)), W2), 0.1, "expected all of them left of -0.1"),
+        ((G, Block(1.0, (), (0.0,)), W2), 0.0, "expected all of them left of 0,"),
+        ((G, W1, W2), -0.1, "the decay rate is -0.1"),
+        ((G, W1, W2), np.nan, "the decay rate is nan"),
+        ((Block(1.0, (), (2j, -2j)), W1, Block(1.0, (-5.0, -5.0))), 0.0, "a pole on the line Re s = 0,"),
+        ((G, W1, W2), 1.0, "a pole on the line Re s = -1,"),
+        ((Block(1.0, (), (-1.0,), 0.1), W1, W2), 0.1, "without dead time"),
+        ((G, Block(0.0), W2), 0.1, "neither these nor W2 zero"),
+        ((Block(2.0), Block(1.0), Block(1.0)), 0.0, "dynamics in G or W1"),
+    ]:
+        with pytest.raises(InputError, match=message):
+            mixed_sensitivity(*problem, decay_rate)
+
+
+def test_filter_that_is_singular_to_rounding() -> None:
+    G = Block(1.0, (), tuple(range(1, 17)))
+    with pytest.raises(SynthesisError, match="too near the axis or each other"):
+        mixed_sensitivity(G, Block(1.0, (), (-1.0,)), Block(1.0, (-5.0,) * 16), 0.0)
