@@ -26,12 +26,12 @@ LIMIT = 12.0
 
 @pytest.fixture(scope="module")
 def design() -> Design:
-    return design_extended(read_model("implied"), 1.5, 4.0, 2.0, 1.0)
+    return design_extended(read_model("implied"), [1.5], 4.0, [(2.0, 1.0)])
 
 
 def test_against_python_control(design: Design, against: Callable[..., object]) -> None:
     """One second of the loop with the thesis's anti-windup; python-control's error there is 1e-3 and more."""
-    loop = design_loop(design, thesis_reference("extended", 1.5), design.thesis_anti_windup())
+    loop = design_loop(design, thesis_reference("extended", [1.5]), design.compensator("thesis"))
     approximate = with_pade(loop, 2)
     time_s = np.linspace(0.0, 1.0, 1001)
 
@@ -48,7 +48,7 @@ def test_against_python_control(design: Design, against: Callable[..., object]) 
 
 def test_against_dop853_by_steps(design: Design, against: Callable[..., object]) -> None:
     """Half a second of the same loop, both to 1e-9 and better."""
-    loop = design_loop(design, thesis_reference("extended", 1.5), design.thesis_anti_windup())
+    loop = design_loop(design, thesis_reference("extended", [1.5]), design.compensator("thesis"))
     time_s = np.linspace(0.0, 0.5, 51)
     against(
         lambda: simulate(loop, (-LIMIT, LIMIT), time_s),

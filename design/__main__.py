@@ -1,22 +1,60 @@
-"""Command line of this room: ``python -m design delay-free`` and ``python -m design extended``."""
+"""Command line of this room: ``python -m design`` with delay-free, extended, anti-windup and audit."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import click
+import numpy as np
 
-from design.contract import Design
+from design.anti_windup import anti_windup
+from design.audit import audit
+from design.audit_text import audit_text
+from design.block import from_polynomial
+from design.contract import Design, read_design
 from design.delay_free import design_delay_free
 from design.extended import METHODS, design_extended
-from identification.files import CommandGroup, write_whole
-from identification.model import read_model
+from design.judgement import SECTOR, facts
+from identification.files import CommandGroup, InputError, write_whole
+from identification.model import IdentifiedModel, read_model
 from identification.thesis import printed
+
+OUTPUT = click.option(
+    "--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="design.json to write."
+)
+DESIGN = click.argument("design", type=click.Path(path_type=Path, dir_okay=False))
+
+
+def corrected_options(command: Callable[..., None]) -> Callable[..., None]:
+    """The options of the corrected anti-windup, the same for both designs."""
+    for option in (
+        click.option(
+            "--bandwidth",
+            type=float,
+            help="Corrected anti-windup: no pole of theta1~ beyond it, rad/s; fastest root of P and W_a unless given.",
+        ),
+        click.option(
+            "--sector",
+            type=float,
+            default=SECTOR,
+            show_default=True,
+            help="Corrected anti-windup: Popov sector, below 1; |u| may reach limit/(1 - sector).",
+        ),
+        click.option(
+            "--recovery",
+            type=float,
+            help="Corrected anti-windup: time in s for y_d to fall to 1 %; as the loop's own transients unless given.",
+        ),
+    ):
+        command = option(command)
+    return command
 
 
 @click.group(cls=CommandGroup)
 def main() -> None:
-    """Design the controllers of the thesis for MODEL: a model.json, or the words table or implied."""
+    """Design the controllers of the thesis for MODEL: a model.json, or the words table or implied; audit a design."""
 
 
 @main.command("delay-free")
@@ -29,10 +67,19 @@ def main() -> None:
     show_default=True,
     help="Of the factor s^2 + epsilon of Lambda, rad^2/s^2.",
 )
-@click.option("--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="design.json to write.")
-def delay_free(model: str, period: float, epsilon: float, output: Path) -> None:
+@corrected_options
+@OUTPUT
+def delay_free(
+    model: str,
+    period: float,
+    epsilon: float,
+    recovery: float | None,
+    sector: float,
+    bandwidth: float | None,
+    output: Path,
+) -> None:
     """Chapter 2: internal model, H-infinity stabiliser, anti-windup; the plant's dead time is ignored."""
-    design = design_delay_free(read_model(model), period, epsilon)
+    design = design_delay_free(read_model(model), period, epsilon, recovery, sector, bandwidth)
     hinf = design.hinf or {}
     unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
     _finish(
@@ -46,17 +93,100 @@ def delay_free(model: str, period: float, epsilon: float, output: Path) -> None:
 
 @main.command("extended")
 @click.argument("model")
-@click.option("--reference-omega", type=float, required=True, help="Angular frequency of the reference, rad/s.")
+@click.option(
+    "--reference-omega",
+    "omegas",
+    type=float,
+    multiple=True,
+    required=True,
+    help="Angular frequency of the reference, rad/s; once for each; 0 is a constant.",
+)
 @click.option("--a", type=float, required=True, help="Closed-loop pole of the free part, rad/s.")
-@click.option("--e", type=float, required=True, help="Q has the denominator s^2 + e s + f.")
-@click.option("--f", type=float, required=True, help="Q has the denominator s^2 + e s + f.")
+@click.option("--e", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
+@click.option("--f", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
 @click.option("--method", type=click.Choice(METHODS), default="zeros", show_default=True, help="How Q is designed.")
-@click.option("--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="design.json to write.")
-def extended(model: str, reference_omega: float, a: float, e: float, f: float, method: str, output: Path) -> None:
+@click.option(
+    "--inverse-epsilon", type=float, default=0.0, show_default=True, help="Of R_eps^-1 = R_0^-1/(1 + eps s)^2 (3.2), s."
+)
+@click.option(
+    "--robust-level", type=float, help="Let T_so roll off as late as ||W_a C S|| <= LEVEL < 1 allows.", metavar="LEVEL"
+)
+@corrected_options
+@OUTPUT
+def extended(
+    model: str,
+    omegas: tuple[float, ...],
+    a: float,
+    e: tuple[float, ...],
+    f: tuple[float, ...],
+    method: str,
+    inverse_epsilon: float,
+    robust_level: float | None,
+    recovery: float | None,
+    sector: float,
+    bandwidth: float | None,
+    output: Path,
+) -> None:
     """Chapters 3 and 4: Smith predictor based controller and anti-windup with the exact dead time."""
-    design = design_extended(read_model(model), reference_omega, a, e, f, method)
+    if len(e) != len(f):
+        raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected as many")
+    pairs = list(zip(e, f, strict=True))
+    design = design_extended(
+        read_model(model), omegas, a, pairs, method, inverse_epsilon, robust_level, recovery, sector, bandwidth
+    )
     poles = ", ".join(f"{pole:.4g}" for pole in design.blocks["T_so"].poles)
     _finish(design, model, output, f"Q designed by its {method}; closed loop with 1/s has the poles {poles}")
+
+
+@main.command("anti-windup")
+@DESIGN
+@click.option("--name", required=True, help="Under which it is kept, and simulated with --anti-windup NAME.")
+@click.option("--numerator", required=True, help="Coefficients, highest power first, as '1 2.5 3'.")
+@click.option("--denominator", required=True, help="Coefficients, highest power first.")
+@OUTPUT
+def anti_windup_command(design: Path, name: str, numerator: str, denominator: str, output: Path) -> None:
+    """Add a theta1~ of your own, strictly proper and stable, to those of DESIGN."""
+    content = read_design(design)
+    if name in ("none", "thesis", "corrected"):
+        raise InputError(f"--name is {name}; expected another name than none, thesis and corrected")
+    above, below = (
+        _coefficients(text, option) for text, option in ((numerator, "numerator"), (denominator, "denominator"))
+    )
+    kind = anti_windup(from_polynomial(above) * from_polynomial(below).inverse())
+    model = IdentifiedModel(content.loop_plant, content.additive_bound, None, {})
+    _finish(
+        replace(content, anti_windup={**content.anti_windup, name: facts(model, kind)}),
+        str(design),
+        output,
+        f"with theta1~ = ({numerator})/({denominator}) as {name}",
+    )
+
+
+@main.command("audit")
+@DESIGN
+@click.option(
+    "--windup",
+    type=float,
+    default=1.0,
+    show_default=True,
+    help="Integral of u - sat(u), in input unit times second, for the lasting offset.",
+)
+def audit_command(design: Path, windup: float) -> None:
+    """Print stability, margins and |W_a C S| of DESIGN with the exact dead time, and judge every anti-windup in it."""
+    if not np.isfinite(windup):
+        raise InputError(f"--windup is {windup:g}; expected a finite number")
+    content = read_design(design)
+    click.echo(audit_text(content, audit(content), windup))
+
+
+def _coefficients(text: str, option: str) -> list[float]:
+    try:
+        found = [float(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        found = []
+    if not found or not np.isfinite(found).all() or not any(found):
+        raise InputError(f"--{option} is '{text}'; expected coefficients such as '1 2.5 3', not all 0")
+    return found
 
 
 def _finish(design: Design, model: str, output: Path, summary: str) -> None:
@@ -64,10 +194,10 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
     write_whole({output: lambda path: path.write_text(text, encoding="utf-8")}, inputs=[Path(model)])
     click.echo(f"{design.kind} design -> {output}")
     click.echo(f"  {summary}")
-    for name, facts in design.anti_windup.items():
-        sector = "any" if facts["popov_sector"] is None else f"{facts['popov_sector']:.4g}"
-        stable = "stable" if facts["theta2_stable"] else "NOT stable: a lasting offset after saturation"
-        click.echo(f"  anti-windup {name:9s} f = {facts['f']:.4g}, Popov sector {sector}, theta2 {stable}")
+    for name, judged in design.anti_windup.items():
+        sector = "any" if judged["popov_sector"] is None else f"{judged['popov_sector']:.4g}"
+        stable = "stable" if judged["theta2_stable"] else "NOT stable: a lasting offset after saturation"
+        click.echo(f"  anti-windup {name:9s} f = {judged['f']:.4g}, Popov sector {sector}, theta2 {stable}")
 
 
 if __name__ == "__main__":

@@ -139,24 +139,35 @@ def plant_denominator(plant: PlantModel) -> Block:
     return Block(1.0, (0j,) * plant.integrators) * mode_product(1.0, plant.pole_modes, plant.real_poles)
 
 
-def require_thesis_class(plant: PlantModel) -> None:
-    """Refuse a plant that is not an integrator times a biproper, stable and minimum phase G: the designs' class (2.20).
+def require_thesis_class(plant: PlantModel, excess: int = 0) -> None:
+    """Refuse a plant that is not an integrator times a proper, stable and minimum phase G: the designs' class (2.20).
+
+    Parameters
+    ----------
+    plant
+        The plant.
+    excess
+        How many poles more than zeros it may have beside the integrator.
 
     Raises
     ------
     InputError
-        There is not exactly one integrator, or beside it there are fewer zeros than poles.
+        There is not exactly one integrator, or the plant has more zeros than poles or too many poles.
     """
     if plant.integrators != 1:
-        raise InputError(f"the plant has {plant.integrators} integrators; the design expects exactly one, Eq. (2.20)")
+        raise InputError(
+            f"the plant has {plant.integrators} integrators; the design expects exactly one, Eq. (2.20): Lemma 1, "
+            "(3.2) and (3.16) are for one"
+        )
     zeros, poles = (
         2 * len(modes) + len(rates)
         for modes, rates in ((plant.zero_modes, plant.real_zeros), (plant.pole_modes, plant.real_poles))
     )
-    if zeros != poles:
+    if not 0 <= poles - zeros <= excess:
+        more = f"or up to {excess} poles more" if excess else "or its controller is improper"
         raise InputError(
             f"beside its integrator the plant has {zeros} zeros and {poles} poles; the design expects equally many, "
-            "or its controller is improper"
+            f"{more}"
         )
 
 
@@ -189,6 +200,8 @@ def polynomial(block: Block, scale: float = 1.0) -> np.ndarray:
 def from_polynomial(coefficients: ArrayLike, scale: float = 1.0) -> Block:
     """The polynomial block with these real coefficients (highest power first) in x = s/scale."""
     trimmed = np.trim_zeros(np.asarray(coefficients, dtype=float), "f")
+    if not len(trimmed):
+        return Block(0.0)
     degree = len(trimmed) - 1
     return Block(trimmed[0] / scale**degree, tuple(complex(root) for root in np.roots(trimmed) * scale))
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from design.anti_windup import AntiWindup, printed_form, washout
-from design.block import Block
+from design.anti_windup import AntiWindup
+from design.block import Block, plant_denominator
 from identification.files import InputError
 from identification.model import (
     bound_from_dict,
@@ -22,7 +22,7 @@ from identification.model import (
 )
 from identification.plant import AdditiveBound, PlantModel
 
-SCHEMA = 1
+SCHEMA = 2
 KINDS = ("delay-free", "extended")
 
 
@@ -38,22 +38,24 @@ class Design:
         The plant that the design is for; a delay-free design ignores its dead time.
     additive_bound
         W_a.
-    reference_omega
-        Angular frequency of the reference in rad/s.
+    reference_omegas
+        Angular frequencies of the reference in rad/s; 0 is a constant.
     blocks
         The design's transfer functions by the thesis's names, see README.
     hinf
         gamma_lower, gamma, W1, W2 and what else the synthesis found; None for an extended design.
     anti_windup
-        ``thesis``: alpha, beta, gamma of (2.23); ``corrected``: rate; each with its f and Popov sector.
+        ``thesis``, ``corrected`` and any others: theta1_tilde and one_plus as :meth:`AntiWindup.to_dict` has them,
+        what was chosen (alpha, beta, gamma of (2.23); sector, bandwidth) and the members of
+        :class:`design.judgement.Judgement`.
     parameters
-        What was chosen: epsilon, or a, e, f and the method for Q.
+        What was chosen: epsilon, or a, the pairs e, f and the method for Q.
     """
 
     kind: str
     plant: PlantModel
     additive_bound: AdditiveBound
-    reference_omega: float
+    reference_omegas: tuple[float, ...]
     blocks: Mapping[str, Block]
     hinf: Mapping[str, Any] | None
     anti_windup: Mapping[str, Mapping[str, Any]]
@@ -64,13 +66,20 @@ class Design:
         """The plant as the design sees it: without dead time in chapter 2."""
         return self.plant.without_delay() if self.kind == "delay-free" else self.plant
 
-    def thesis_anti_windup(self) -> AntiWindup:
-        """theta1~ of (2.23) with the design's alpha, beta and gamma."""
-        return printed_form(self.anti_windup["thesis"])
+    def compensator(self, name: str) -> AntiWindup:
+        """theta1~ of this name, such as ``thesis`` or ``corrected``; raises InputError when there is none."""
+        if name not in self.anti_windup:
+            raise InputError(f"there is no anti-windup '{name}'; the design has {', '.join(self.anti_windup)}")
+        return AntiWindup.from_dict(self.anti_windup[name])
 
-    def corrected_anti_windup(self) -> AntiWindup:
-        """theta1~ with theta1~(0) = -1."""
-        return washout(self.additive_bound, number(self.anti_windup["corrected"], "rate"))
+    def controller_parts(self) -> tuple[Block, Block]:
+        """The blocks of C = forward/(1 - feedback exp(-h s)) with h the plant's dead time, (3.10) and (3.31).
+
+        Chapter 2: K A/Lambda, no feedback. Chapters 3 and 4: K and T_so.
+        """
+        if self.kind == "delay-free":
+            return self.blocks["K"] * plant_denominator(self.plant) * self.blocks["Lambda"].inverse(), Block(0.0)
+        return self.blocks["K"], self.blocks["T_so"]
 
     def to_json(self) -> str:
         """The text of design.json; every number is finite or this raises ValueError."""
@@ -82,7 +91,7 @@ class Design:
             "kind": self.kind,
             "plant": plant_to_dict(self.plant),
             "additive_bound": bound_to_dict(self.additive_bound),
-            "reference_omega": self.reference_omega,
+            "reference_omegas": list(self.reference_omegas),
             "parameters": dict(self.parameters),
             "blocks": {name: block.to_dict() for name, block in self.blocks.items()},
             "hinf": hinf,
@@ -113,10 +122,10 @@ def read_design(path: Path) -> Design:
             kind=content["kind"],
             plant=plant_from_dict(member(content, "plant")),
             additive_bound=bound_from_dict(member(content, "additive_bound")),
-            reference_omega=number(content, "reference_omega"),
+            reference_omegas=_omegas(content),
             blocks={name: Block.from_dict(member(blocks, name)) for name in blocks},
             hinf=hinf,
-            anti_windup={name: member(anti_windup, name) for name in ("thesis", "corrected")},
+            anti_windup={name: member(anti_windup, name) for name in anti_windup},
             parameters=member(content, "parameters"),
         )
         needed = ("K", "Lambda") if design.kind == "delay-free" else ("K", "T_so")
@@ -125,10 +134,19 @@ def read_design(path: Path) -> Design:
                 raise InputError(f"the block '{name}' is missing")
             if design.blocks[name].delay_s:
                 raise InputError(f"the block '{name}' has a dead time; expected none, the loop has the plant's")
-        if not design.reference_omega > 0:
-            raise InputError(f"reference_omega is {design.reference_omega:g}; expected a positive number")
-        design.thesis_anti_windup()
-        design.corrected_anti_windup()
+        for name in {*design.anti_windup, "thesis", "corrected"}:
+            design.compensator(name)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return design
+
+
+def _omegas(content: Mapping[str, Any]) -> tuple[float, ...]:
+    """The member reference_omegas; raises InputError when it is no list of numbers that are not negative."""
+    given = content.get("reference_omegas")
+    if not isinstance(given, list) or not given:
+        raise InputError(f"reference_omegas is {given!r}; expected a list of numbers")
+    omegas = tuple(number({"reference_omegas": omega}, "reference_omegas") for omega in given)
+    if min(omegas) < 0:
+        raise InputError(f"reference_omegas has {min(omegas):g}; expected no negative number")
+    return omegas

@@ -6,20 +6,28 @@ import math
 
 import numpy as np
 
-from design.anti_windup import compensators, printed_form
+from design.anti_windup import printed_form
 from design.block import Block, bound_block, plant_denominator, plant_numerator, require_thesis_class
 from design.contract import Design
+from design.corrected import SETTLED
 from design.internal_model import internal_model, reference_polynomial
+from design.judgement import SECTOR, compensators
 from design.mixed_sensitivity import SynthesisError, mixed_sensitivity
 from identification.files import InputError
 from identification.model import IdentifiedModel
 
 TRACKING = 0.01  # W1 asks for |S| below gamma times this at the reference's frequencies
-SETTLED = 0.01  # what is left of a transient after one period of the reference
 ATTEMPTS = 6  # with the decay rate doubled each time the synthesis fails its own check
 
 
-def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -> Design:
+def design_delay_free(
+    model: IdentifiedModel,
+    period_s: float,
+    epsilon: float,
+    recovery_s: float | None = None,
+    sector: float = SECTOR,
+    bandwidth: float | None = None,
+) -> Design:
     """Chapter 2: Lambda, F1, F2, G_A, the stabiliser K, theta1~, theta1 and theta2.
 
     Parameters
@@ -30,6 +38,9 @@ def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -
         Period of the sinusoidal reference in seconds.
     epsilon
         Of the factor s^2 + epsilon of Lambda, in rad^2/s^2.
+    recovery_s, sector, bandwidth
+        Of the corrected anti-windup, see :func:`design.judgement.compensators`; unless given, the recovery takes half
+        as long as the loop's own transients.
 
     Raises
     ------
@@ -78,13 +89,15 @@ def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -
         except SynthesisError:
             if attempt == ATTEMPTS - 1 or decay_rate == slowest / 2:
                 raise
-    anti_windup = compensators(model, rate=2 * decay_rate)
+    if recovery_s is None:
+        recovery_s = math.log(1 / SETTLED) / (2 * decay_rate)
+    anti_windup = compensators(model, recovery_s, sector, bandwidth)
     thesis = printed_form(anti_windup["thesis"])
     return Design(
         kind="delay-free",
         plant=model.plant,
         additive_bound=model.additive_bound,
-        reference_omega=omega,
+        reference_omegas=(omega,),
         blocks={
             "Lambda": units.Lambda,
             "F1": units.F1,
@@ -97,9 +110,11 @@ def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -
         },
         hinf={
             "gamma_lower": synthesis.gamma_lower,
+            "reason": synthesis.reason,
             "gamma": synthesis.gamma,
             "decay_rate": decay_rate,
             "gamma_line_lower": synthesis.gamma_line_lower,
+            "line_reason": synthesis.line_reason,
             "gamma_line": synthesis.gamma_line,
             "W1": W1,
             "W2": W2,
@@ -107,8 +122,3 @@ def design_delay_free(model: IdentifiedModel, period_s: float, epsilon: float) -
         anti_windup=anti_windup,
         parameters={"period_s": period_s, "epsilon": epsilon},
     )
-
-
-def controller(design: Design) -> Block:
-    """C = K/(1 + F) = K A/Lambda of a delay-free design, Thesis Eq. (3.10)."""
-    return design.blocks["K"] * plant_denominator(design.plant) * design.blocks["Lambda"].inverse()

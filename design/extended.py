@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
+from typing import Any
 
-from design.anti_windup import compensators, printed_form
-from design.block import Block, plant_block
+import numpy as np
+
+from design.anti_windup import printed_form
+from design.block import Block, plant_block, plant_denominator, plant_numerator
 from design.contract import Design
+from design.corrected import SETTLED
+from design.judgement import SECTOR, compensators
+from design.redesign import robust_free_part
 from design.smith_predictor import free_part, stabiliser
-from design.stable_interpolation import by_poles, by_zeros, conditions, lagrange
+from design.stable_interpolation import StableFunction, by_poles, by_zeros, conditions, lagrange
 from identification.files import InputError
 from identification.model import IdentifiedModel
 
@@ -16,7 +22,16 @@ METHODS = ("zeros", "lagrange", "poles")
 
 
 def design_extended(
-    model: IdentifiedModel, reference_omega: float, a: float, e: float, f: float, method: str = "zeros"
+    model: IdentifiedModel,
+    reference_omegas: Sequence[float],
+    a: float,
+    pairs: Sequence[tuple[float, float]],
+    method: str = "zeros",
+    inverse_epsilon: float = 0.0,
+    robust_level: float | None = None,
+    recovery_s: float | None = None,
+    sector: float = SECTOR,
+    bandwidth: float | None = None,
 ) -> Design:
     """Chapters 3 and 4: Q, C_0, T_so, F1, F2, K_0, K_1, K, theta1~ and theta2.
 
@@ -27,48 +42,68 @@ def design_extended(
     ----------
     model
         Plant with its dead time, and W_a.
-    reference_omega
-        Angular frequency of the sinusoidal reference in rad/s.
+    reference_omegas
+        Angular frequencies of the reference in rad/s; 0 is a constant.
     a
         Closed-loop pole of the free part in rad/s, Table 4.1.
-    e, f
-        Denominator of Q when ``method`` is "zeros".
+    pairs
+        e and f of the denominator of Q, a pair for each frequency above 0, when ``method`` is "zeros".
     method
         How Q is designed, one of :data:`METHODS`; the results of all three are kept in ``parameters``.
+    inverse_epsilon
+        epsilon of the approximate inverse of (3.2) in seconds; 0 is the exact one.
+    robust_level
+        Unless None, T_so rolls off as late as ||W_a C S|| <= robust_level < 1 allows, see
+        :func:`design.redesign.robust_free_part`.
+    recovery_s, sector, bandwidth
+        Of the corrected anti-windup, see :func:`design.judgement.compensators`; unless given, the recovery takes as
+        long as exp(-a t) takes to 1 %.
 
     Raises
     ------
     InputError
-        A number is out of its range, the method gives an unstable Q, or the plant has more pole modes than
-        zero modes.
+        A number is out of its range, the method gives an unstable Q, the level cannot be met, or the plant is not of
+        the class.
     """
-    wanted = conditions(reference_omega, model.plant.delay_s, a)
+    wanted = conditions(reference_omegas, model.plant.delay_s, a)
     designs = {
-        "zeros": lambda: by_zeros(wanted, e, f),
+        "zeros": lambda: by_zeros(wanted, pairs),
         "lagrange": lambda: lagrange(wanted),
         "poles": lambda: by_poles(wanted),
     }
-    Q = designs[method]()
-    tried: dict[str, object] = {}
-    for name, design in designs.items():
-        try:
-            tried[name] = asdict(design())
-        except InputError as error:
-            tried[name] = {"refused": str(error)}
+    parameters: dict[str, Any] = {
+        "a": a,
+        "pairs": [list(pair) for pair in pairs],
+        "method": method,
+        "inverse_epsilon": inverse_epsilon,
+    }
+    if robust_level is None:
+        free = free_part(designs[method](), a)
+    elif method != "zeros" or inverse_epsilon:
+        raise InputError(
+            "the robust redesign is by the zeros of Q with the exact inverse; found another method or epsilon"
+        )
+    else:
+        redesign = robust_free_part(model, wanted, pairs, robust_level)
+        free = redesign.free
+        parameters |= {"robust_level": robust_level, "roll_off": redesign.rate, "roll_off_order": redesign.order}
+    parameters["Q"] = {name: _attempt(design) for name, design in designs.items()}
 
-    free = free_part(Q, a)
-    K_0, K_1, K = stabiliser(model.plant, free.T_so)
+    K_0, K_1, K = stabiliser(model.plant, free.T_so, inverse_epsilon)
     F1 = plant_block(model.plant)
-    F2 = (K_1 * Block(1.0, (0j,)) * free.T_so).scaled(-1.0)  # W_aw/(K R_0) with W_aw = -s T_so, Eq. (3.29)
-    anti_windup = compensators(model, rate=a)
+    # W_aw/(K R_0) with W_aw = -s T_so, Eq. (3.29)
+    F2 = (free.T_so * plant_denominator(model.plant) * plant_numerator(model.plant).inverse()).scaled(-1.0)
+    if recovery_s is None:
+        recovery_s = float(np.log(1 / SETTLED)) / a
+    anti_windup = compensators(model, recovery_s, sector, bandwidth)
     thesis = printed_form(anti_windup["thesis"])
     return Design(
         kind="extended",
         plant=model.plant,
         additive_bound=model.additive_bound,
-        reference_omega=reference_omega,
+        reference_omegas=tuple(float(omega) for omega in reference_omegas),
         blocks={
-            "Q": Q.block(),
+            "Q": free.Q,
             "C0": free.C_0,
             "T_so": free.T_so,
             "F": Block(-free.T_so.gain, free.T_so.zeros, free.T_so.poles, model.plant.delay_s),
@@ -82,5 +117,13 @@ def design_extended(
         },
         hinf=None,
         anti_windup=anti_windup,
-        parameters={"a": a, "e": e, "f": f, "method": method, "Q": tried},
+        parameters=parameters,
     )
+
+
+def _attempt(design: Callable[[], StableFunction]) -> dict[str, Any]:
+    try:
+        found = design()
+    except InputError as error:
+        return {"refused": str(error)}
+    return {"numerator": list(found.numerator), "denominator": found.denominator.tolist()}

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from design.block import Block, from_polynomial, plant_denominator, plant_numerator, require_thesis_class
-from design.stable_interpolation import StableFunction
+from design.block import Block, from_polynomial, plant_denominator, plant_numerator, polynomial, require_thesis_class
+from design.stable_interpolation import Conditions, StableFunction, poles_of, polynomial_through
+from identification.files import InputError
 from identification.plant import Complex, PlantModel
 
 
@@ -18,20 +20,17 @@ class FreePart:
 
     Parameters
     ----------
+    Q
+        Stable, Thesis Eq. (4.2).
     C_0
         Stabilises 1/s, Thesis Eq. (3.9) and (4.2).
     T_so
         (C_0/s)/(1 + C_0/s), Thesis Eq. (3.19); its poles are -a, -a and those of Q by construction.
     """
 
+    Q: Block
     C_0: Block
     T_so: Block
-
-
-def bezout(a: float) -> tuple[Block, Block, Block, Block]:
-    """N_p, D_p, X, Y of 1/s with N_p X + D_p Y = 1, Thesis Eq. (3.7)-(3.8): 1/(s+a), s/(s+a), a, 1."""
-    pole = (complex(-a),)
-    return Block(1.0, (), pole), Block(1.0, (0j,), pole), Block(a), Block(1.0)
 
 
 def free_part(Q: StableFunction, a: float) -> FreePart:
@@ -43,26 +42,89 @@ def free_part(Q: StableFunction, a: float) -> FreePart:
     (s + a)^2 q over that denominator times s, so that T_so = (a (s + a) q + s n)/((s + a)^2 q): nothing cancels
     by subtraction. At the interpolation points T_so = exp(T_d s).
     """
-    q = np.array([1.0, Q.e, Q.f])
-    shifted = np.polymul([1.0, a], q)
+    shifted = np.polymul([1.0, a], Q.denominator)
     numerator = from_polynomial(np.polyadd(a * shifted, np.polymul([1.0, 0.0], Q.numerator)))
     denominator = from_polynomial(np.polysub(shifted, Q.numerator))
     poles = Block(1.0, (complex(-a), complex(-a), *Q.poles))
-    return FreePart(C_0=numerator * denominator.inverse(), T_so=numerator * poles.inverse())
+    return FreePart(Q.block(), numerator * denominator.inverse(), numerator * poles.inverse())
 
 
-def stabiliser(plant: PlantModel, T_so: Block) -> tuple[Block, Block, Block]:
-    """K_0 = C_0/(1 + C_0/s) = s T_so, K_1 = 1/(K R_0) and K = K_0 K_1, Thesis Eq. (3.26)-(3.29).
+def rolled_off(wanted: Conditions, pairs: Sequence[tuple[float, float]], rate: float, order: int) -> FreePart:
+    """The design by the zeros of Q with a T_so that rolls off beyond a rate: more poles, the same conditions.
+
+        T_so = n(s)/((s + a)^2 q(s) (1 + s/rate)^order),   n of degree 2 k + 1 for k frequencies.
+
+    Parameters
+    ----------
+    wanted
+        What Q must be, and a.
+    pairs
+        e and f of the factors of q, as in :func:`design.stable_interpolation.by_zeros`.
+    rate
+        In rad/s, positive.
+    order
+        Number of additional poles; 0 is the design of the thesis.
 
     Raises
     ------
     InputError
-        The plant is not of the class (2.20), so that K_1 would be improper.
+        A number is out of its range.
+
+    Notes
+    -----
+    The thesis's T_so has one pole more than zeros, so that K = s T_so/(K R_0) does not roll off at all. (4.4) says
+    T_so(0) = 1, T_so'(0) = T_d and T_so(j omega) = exp(j omega T_d): 2 k + 2 real conditions, as many as n has
+    coefficients, whatever the denominator. Q = ((s + a)^2 T_so - a (s + a))/s is then stable, so that this is
+    within Theorem 2.1.1.
     """
-    require_thesis_class(plant)
+    if not (np.isfinite(rate) and rate > 0):
+        raise InputError(f"the roll-off begins at {rate:g} rad/s; expected a positive number")
+    a, delay_s, s = wanted.a, wanted.delay_s, 1j * np.array(wanted.omegas)
+    poles = Block(rate**-order, (*poles_of(wanted, pairs), *(complex(-rate),) * order))
+    q = polynomial(poles)
+    D = np.polymul([1.0, 2 * a, a**2], q)
+    values = np.polyval(D, s) * np.exp(s * delay_s)
+    points = np.append(0.0, -np.square(wanted.omegas))
+    even = polynomial_through(points, np.append(D[-1], values.real))
+    odd = polynomial_through(points, np.append(D[-2] + delay_s * D[-1], values.imag / np.array(wanted.omegas)))
+    n = np.zeros(2 * len(points))
+    n[0::2], n[1::2] = odd, even
+    # both vanish at s = 0 by the first condition
+    over_s = np.asarray(np.polysub(D, n))[:-1]
+    Q_numerator = np.asarray(np.polysub(n, a * np.polymul([1.0, a], q)))[:-1]
+    numerator = from_polynomial(n)
+    return FreePart(
+        Q=from_polynomial(Q_numerator) * poles.inverse(),
+        C_0=numerator * from_polynomial(over_s).inverse(),
+        T_so=numerator * Block(1.0, (), (complex(-a), complex(-a))) * poles.inverse(),
+    )
+
+
+def stabiliser(plant: PlantModel, T_so: Block, inverse_epsilon: float = 0.0) -> tuple[Block, Block, Block]:
+    """K_0 = C_0/(1 + C_0/s) = s T_so, K_1 = 1/(K R_0) and K = K_0 K_1, Thesis Eq. (3.26)-(3.29).
+
+    Parameters
+    ----------
+    plant
+        One integrator; beside it as many zeros as poles, or fewer where T_so or ``inverse_epsilon`` rolls off.
+    T_so
+        See :class:`FreePart`.
+    inverse_epsilon
+        epsilon of R_eps^-1 = R_0^-1/(1 + epsilon s)^2 in seconds, Thesis Eq. (3.2); 0 is the exact inverse.
+
+    Raises
+    ------
+    InputError
+        epsilon is negative, the plant is not of the class, or K comes out improper.
+    """
+    if not (np.isfinite(inverse_epsilon) and inverse_epsilon >= 0):
+        raise InputError(f"epsilon of the approximate inverse is {inverse_epsilon:g} s; expected 0 or more")
+    lag = (complex(-1 / inverse_epsilon),) * 2 if inverse_epsilon else ()
+    require_thesis_class(plant, T_so.relative_degree - 1 + len(lag))
     s = Block(1.0, (0j,))
     K_0 = s * T_so
-    K_1 = plant_denominator(plant) * s.inverse() * plant_numerator(plant).inverse()
+    inverse = plant_denominator(plant) * s.inverse() * plant_numerator(plant).inverse()
+    K_1 = inverse * Block(float(np.prod(np.abs(lag))), (), lag)
     return K_0, K_1, K_0 * K_1
 
 

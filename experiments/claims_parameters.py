@@ -29,9 +29,9 @@ def table_2_1(inputs: Inputs) -> dict[str, float]:
 def table_4_2(inputs: Inputs) -> dict[str, float]:
     """b, c and d of Q, Thesis Eq. (4.6) and (4.7)."""
     chosen = printed()["extended"]
-    wanted = conditions(chosen["reference"]["omega"], plant_of(inputs).delay_s, chosen["a"])
-    Q = by_zeros(wanted, chosen["e"], chosen["f"])
-    return {"table_4_2.b": Q.b, "table_4_2.c": Q.c, "table_4_2.d": Q.d}
+    wanted = conditions([chosen["reference"]["omega"]], plant_of(inputs).delay_s, chosen["a"])
+    Q = by_zeros(wanted, [(chosen["e"], chosen["f"])])
+    return {f"table_4_2.{name}": value for name, value in zip("bcd", Q.numerator, strict=True)}
 
 
 def anti_windup(inputs: Inputs) -> dict[str, float]:

@@ -55,7 +55,9 @@ def extended(inputs: Inputs) -> dict[str, float]:
     ``extended.recovery_s``: when the loop with the thesis's anti-windup leaves saturation for good.
     """
     chosen = printed()["extended"]
-    design = design_extended(read_model("implied"), chosen["reference"]["omega"], chosen["a"], chosen["e"], chosen["f"])
+    design = design_extended(
+        read_model("implied"), [chosen["reference"]["omega"]], chosen["a"], [(chosen["e"], chosen["f"])]
+    )
     summary = extended_tables(design)["extended_summary"].set_index("run")
     return {
         "extended.tracking_error": float(summary["peak_error_after_1s"]["none"]),

@@ -144,8 +144,8 @@ def _internal_model(inputs: Inputs) -> InternalModel:
 
 def _free_part(plant: PlantModel) -> FreePart:
     chosen = printed()["extended"]
-    wanted = conditions(chosen["reference"]["omega"], plant.delay_s, chosen["a"])
-    return free_part(by_zeros(wanted, chosen["e"], chosen["f"]), chosen["a"])
+    wanted = conditions([chosen["reference"]["omega"]], plant.delay_s, chosen["a"])
+    return free_part(by_zeros(wanted, [(chosen["e"], chosen["f"])]), chosen["a"])
 
 
 def _over_one_plus_F(block: Block, T_so: Block, delay_s: float) -> Block:

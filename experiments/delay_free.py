@@ -7,7 +7,7 @@ import pandas as pd
 
 from design.contract import Design
 from experiments.scenarios import thesis_reference
-from experiments.tracking import loops, run_all, tracking_summary, tracking_table
+from experiments.tracking import loops, run_all, span, tracking_summary, tracking_table
 from identification.thesis import printed
 
 PERIODS = 6  # the thesis does not print its horizon
@@ -29,14 +29,14 @@ def delay_free_tables(design: Design, limit: float | None = None) -> dict[str, p
     dict
         ``delay_free`` and ``delay_free_summary``, see :mod:`experiments.tracking`.
     """
-    reference = thesis_reference("delay-free", design.reference_omega)
+    reference = thesis_reference("delay-free", design.reference_omegas)
     limit_is_given = limit is not None
     limit = printed()["delay_free"]["limit"] if limit is None else limit
-    horizon = PERIODS * 2 * np.pi / reference.omega
+    horizon = PERIODS * span(design, reference)
     time_s = np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1)
     runs = run_all(loops(design, reference), limit, time_s)
-    required = reference.amplitude / abs(complex(design.loop_plant(1j * reference.omega)))
+    required = reference.required(design.loop_plant)
     return {
         "delay_free": tracking_table(runs, reference),
-        "delay_free_summary": tracking_summary(runs, limit, limit_is_given, reference, required),
+        "delay_free_summary": tracking_summary(runs, limit, limit_is_given, reference, required, horizon / PERIODS),
     }

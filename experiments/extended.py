@@ -10,7 +10,7 @@ from experiments.closed_loop import SaturatedLoop, simulate
 from experiments.metrics import last_saturation
 from experiments.pade import with_pade
 from experiments.scenarios import thesis_reference
-from experiments.tracking import loops, run_all, tracking_summary, tracking_table
+from experiments.tracking import loops, run_all, span, tracking_summary, tracking_table
 from identification.files import InputError
 from identification.thesis import printed
 
@@ -42,9 +42,9 @@ def extended_tables(design: Design, limit: float | None = None) -> dict[str, pd.
     system operates in the nonlinear region"; the limit is the one that comes nearest to this, see
     :func:`limit_for_last_saturation`.
     """
-    reference = thesis_reference("extended", design.reference_omega)
-    required = reference.amplitude / abs(complex(design.loop_plant(1j * reference.omega)))
-    horizon = PERIODS * 2 * np.pi / reference.omega
+    reference = thesis_reference("extended", design.reference_omegas)
+    required = reference.required(design.loop_plant)
+    horizon = PERIODS * span(design, reference)
     target = printed()["extended"]["desaturation_s"]
     exact = loops(design, reference)
     limit_is_given = limit is not None
@@ -54,7 +54,7 @@ def extended_tables(design: Design, limit: float | None = None) -> dict[str, pd.
     runs = run_all(every, limit, np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1))
     return {
         "extended": tracking_table(runs, reference),
-        "extended_summary": tracking_summary(runs, limit, limit_is_given, reference, required),
+        "extended_summary": tracking_summary(runs, limit, limit_is_given, reference, required, horizon / PERIODS),
     }
 
 
@@ -75,7 +75,8 @@ def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: fl
     Raises
     ------
     InputError
-        No limit between ``required`` and 64 times it brings the last saturation below ``target_s``, or every one does.
+        The reference is constant, no limit between ``required`` and 64 times it brings the last saturation below
+        ``target_s``, or every one does.
 
     Notes
     -----
@@ -83,6 +84,9 @@ def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: fl
     ``target_s`` itself need not occur. Bisection ends at a crossing of ``target_s`` (should there be several, at
     one of them), and of the two ends, 1e-6 apart, the one nearer in time is returned.
     """
+
+    if required == 0:
+        raise InputError("a constant reference takes no control in the steady state; expected a limit (--limit)")
 
     def last(limit: float) -> float:
         time = last_saturation(simulate(loop, (-limit, limit), np.array([0.0, horizon_s])))

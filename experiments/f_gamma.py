@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import minimize_scalar
 
-from design.anti_windup import beta_grid, optimal_gamma, second_order, thesis_choice, uncertainty_cost
+from design.anti_windup import second_order, uncertainty_cost
+from design.printed_optimum import beta_grid, optimal_gamma, thesis_choice
 from identification.plant import AdditiveBound
 
 

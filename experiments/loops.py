@@ -10,7 +10,6 @@ from scipy.linalg import block_diag
 from design.anti_windup import AntiWindup
 from design.block import Block, plant_block
 from design.contract import Design
-from design.delay_free import controller
 from design.realization import StateSpace, realize
 from experiments.closed_loop import SaturatedLoop
 from experiments.scenarios import PidBenchmark, Reference
@@ -52,10 +51,7 @@ def design_loop(design: Design, reference: Reference, anti_windup: AntiWindup | 
     """
     plant = design.loop_plant
     P = realize(plant_block(plant))
-    if design.kind == "delay-free":
-        forward, feedback = realize(controller(design)), realize(Block(0.0))
-    else:
-        forward, feedback = realize(design.blocks["K"]), realize(design.blocks["T_so"])
+    forward, feedback = (realize(block) for block in design.controller_parts())
     if anti_windup is None:
         theta = realize(Block(0.0), Block(0.0))
     else:

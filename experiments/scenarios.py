@@ -3,46 +3,81 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from identification.files import InputError
+from identification.plant import PlantModel
 from identification.thesis import printed
 
 
 @dataclass(frozen=True)
 class Reference:
-    """r(t) = amplitude sin(omega t + phase_rad) + offset.
+    """r(t) = sum of amplitude_i sin(omega_i t + phase_i), and an offset.
 
     Parameters
     ----------
-    amplitude, offset
+    amplitudes, offset
         In the plant's output unit.
-    omega
-        In rad/s, not negative.
-    phase_rad
-        In radians.
+    omegas
+        In rad/s, not negative; as many as there are amplitudes.
+    phases_rad
+        In radians; as many.
     """
 
-    amplitude: float
-    omega: float
-    phase_rad: float
+    amplitudes: tuple[float, ...]
+    omegas: tuple[float, ...]
+    phases_rad: tuple[float, ...]
     offset: float
 
     def __post_init__(self) -> None:
-        if not np.isfinite([self.amplitude, self.omega, self.phase_rad, self.offset]).all() or self.omega < 0:
+        if not len(self.amplitudes) == len(self.omegas) == len(self.phases_rad) > 0:
+            raise InputError(
+                f"the reference has {len(self.omegas)} frequencies, {len(self.amplitudes)} amplitudes and "
+                f"{len(self.phases_rad)} phases; expected as many of each, and one at least"
+            )
+        numbers = [*self.amplitudes, *self.omegas, *self.phases_rad, self.offset]
+        if not np.isfinite(numbers).all() or min(self.omegas) < 0:
             raise InputError(f"the reference is {self}; expected finite numbers and omega >= 0")
 
     def __call__(self, time_s: np.ndarray) -> np.ndarray:
         """r at times of any shape."""
-        return np.asarray(self.amplitude * np.sin(self.omega * time_s + self.phase_rad) + self.offset)
+        parts = zip(self.amplitudes, self.omegas, self.phases_rad, strict=True)
+        return np.asarray(sum(a * np.sin(omega * time_s + phase) for a, omega, phase in parts) + self.offset)
+
+    @property
+    def amplitude(self) -> float:
+        """The most that the sinusoids add up to, in the plant's output unit."""
+        return float(np.abs(self.amplitudes).sum())
+
+    @property
+    def period_s(self) -> float:
+        """Of the slowest sinusoid, in seconds; infinite when all is constant."""
+        slowest = min((omega for omega in self.omegas if omega > 0), default=None)
+        return math.inf if slowest is None else 2 * math.pi / slowest
+
+    def required(self, plant: PlantModel) -> float:
+        """The most that the control reaches which makes the plant's output r in the steady state, in its input unit.
+
+        The sum of amplitude/|P(j omega)|; 0 at omega = 0, where the plant integrates.
+        """
+        parts = zip(self.amplitudes, self.omegas, strict=True)
+        return float(sum(abs(a / complex(plant(1j * omega))) for a, omega in parts if omega > 0))
 
     def generator(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The autonomous system that generates r: matrix (3, 3), output row (3,), initial state (3,)."""
-        matrix = np.array([[0.0, self.omega, 0.0], [-self.omega, 0.0, 0.0], [0.0, 0.0, 0.0]])
-        start = np.array([math.sin(self.phase_rad), math.cos(self.phase_rad), 1.0])
-        return matrix, np.array([self.amplitude, 0.0, self.offset]), start
+        """The autonomous system that generates r: matrix (n, n), output row (n,), initial state (n,)."""
+        matrix = block_diag(*(np.array([[0.0, omega], [-omega, 0.0]]) for omega in self.omegas), np.zeros((1, 1)))
+        row = [number for amplitude in self.amplitudes for number in (amplitude, 0.0)]
+        start = [number for phase in self.phases_rad for number in (math.sin(phase), math.cos(phase))]
+        return matrix, np.array([*row, self.offset]), np.array([*start, 1.0])
+
+
+def sinusoid(amplitude: float, omega: float, phase_rad: float, offset: float) -> Reference:
+    """r(t) = amplitude sin(omega t + phase_rad) + offset, omega in rad/s."""
+    return Reference((amplitude,), (omega,), (phase_rad,), offset)
 
 
 @dataclass(frozen=True)
@@ -58,7 +93,11 @@ class PidBenchmark:
     step: float
 
 
-def thesis_reference(kind: str, omega: float) -> Reference:
-    """The thesis's reference for a design of this kind ("delay-free" or "extended") at another omega in rad/s."""
+def thesis_reference(kind: str, omegas: Sequence[float]) -> Reference:
+    """The thesis's reference for a design of this kind ("delay-free" or "extended") at other omegas in rad/s.
+
+    Of several frequencies each has the thesis's amplitude and phase, which is our choice; omega = 0 is a constant.
+    """
     values = printed()[kind.replace("-", "_")]["reference"]
-    return Reference(values["amplitude"], omega, values["phase_rad"], values["offset"])
+    n = len(omegas)
+    return Reference((values["amplitude"],) * n, tuple(omegas), (values["phase_rad"],) * n, values["offset"])

@@ -14,22 +14,26 @@ from experiments.closed_loop import DivergenceError, Run, SaturatedLoop, simulat
 from experiments.loops import design_loop
 from experiments.metrics import last_saturation, over_last, settling_time
 from experiments.scenarios import Reference
+from identification.model import number
 
 SETTLED = 0.01  # band of the settling time, as a share of the reference's amplitude
 
 
 def compensators(design: Design) -> dict[str, AntiWindup | None]:
     """No anti-windup, the thesis's (2.23), and the corrected one with theta1~(0) = -1."""
-    return {
-        "none": None,
-        "thesis": design.thesis_anti_windup(),
-        "corrected": design.corrected_anti_windup(),
-    }
+    return {"none": None} | {name: design.compensator(name) for name in ("thesis", "corrected")}
 
 
 def loops(design: Design, reference: Reference) -> dict[str, SaturatedLoop]:
     """The loop of the design with each of :func:`compensators`."""
     return {name: design_loop(design, reference, kind) for name, kind in compensators(design).items()}
+
+
+def span(design: Design, reference: Reference) -> float:
+    """The period of the reference's slowest sinusoid in seconds; of a constant, twice the corrected one's recovery."""
+    if np.isfinite(reference.period_s):
+        return reference.period_s
+    return 2 * number(design.anti_windup["corrected"], "recovery_s")
 
 
 def run_all(loops: Mapping[str, SaturatedLoop], limit: float, time_s: np.ndarray) -> dict[str, Run]:
@@ -72,7 +76,7 @@ def tracking_table(runs: Mapping[str, Run], reference: Reference) -> pd.DataFram
 
 
 def tracking_summary(
-    runs: Mapping[str, Run], limit: float, limit_is_given: bool, reference: Reference, required: float
+    runs: Mapping[str, Run], limit: float, limit_is_given: bool, reference: Reference, required: float, span_s: float
 ) -> pd.DataFrame:
     """One row a run: what the captions say.
 
@@ -88,6 +92,8 @@ def tracking_summary(
         r(t).
     required
         Amplitude of the control that perfect tracking of the sinusoid needs, in the actuator's unit.
+    span_s
+        Length of what is called the last period below, in seconds.
 
     Returns
     -------
@@ -99,10 +105,9 @@ def tracking_summary(
         amplitude). A run that diverges has empty cells.
     """
     rows = []
-    period = 2 * np.pi / reference.omega
     for name, run in runs.items():
         error = run.outputs["error"]
-        offset, ripple = over_last(run.time_s, error, period)
+        offset, ripple = over_last(run.time_s, error, span_s)
         rows.append(
             {
                 "run": name,
@@ -110,11 +115,11 @@ def tracking_summary(
                 "limit_is_given": int(limit_is_given),
                 "required": required,
                 "last_saturation_s": last_saturation(run),
-                "settling_s": settling_time(run.time_s, error - offset, SETTLED * abs(reference.amplitude)),
+                "settling_s": settling_time(run.time_s, error - offset, SETTLED * reference.amplitude),
                 "offset": offset,
                 "ripple": ripple,
                 "peak_error_after_1s": np.abs(error[run.time_s >= 1.0]).max(),
-                "relative_error_percent": 100 * (abs(offset) + ripple) / abs(reference.amplitude),
+                "relative_error_percent": 100 * (abs(offset) + ripple) / reference.amplitude,
             }
         )
     return pd.DataFrame(rows)

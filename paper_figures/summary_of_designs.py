@@ -73,12 +73,14 @@ def sentences(design: Design, name: str, tables: Mapping[str, pd.DataFrame]) -> 
     thesis, corrected = (design.anti_windup[kind] for kind in ("thesis", "corrected"))
     said.append(
         f"theta1~: alpha = {number(thesis['alpha'])} s, beta = {number(thesis['beta'])} s, gamma = "
-        f"{number(thesis['gamma'])} by (2.23), corrected with the rate {number(corrected['rate'])} 1/s"
+        f"{number(thesis['gamma'])} by (2.23); corrected for the sector {number(corrected['sector'])}, recovery in "
+        f"{number(corrected['recovery_s'])} s"
     )
     if name == "extended" and "f_gamma" in tables:
         said.append(f"The least f of (2.23) over beta is {number(only(tables['f_gamma'], 'f_best'))}")
     if name in tables:
-        said.append(f"The thesis's reference at {number(design.reference_omega)} rad/s. {required_input(tables[name])}")
+        omegas = ", ".join(number(omega) for omega in design.reference_omegas)
+        said.append(f"The thesis's reference at {omegas} rad/s. {required_input(tables[name])}")
     return ". ".join(said) + "."
 
 

@@ -25,7 +25,7 @@ def table() -> IdentifiedModel:
 @pytest.fixture(scope="session")
 def extended_design(implied: IdentifiedModel) -> Design:
     """Chapter 4 with the printed free parameters."""
-    return design_extended(implied, reference_omega=1.5, a=4.0, e=2.0, f=1.0)
+    return design_extended(implied, reference_omegas=[1.5], a=4.0, pairs=[(2.0, 1.0)])
 
 
 @pytest.fixture(scope="session")

@@ -28,4 +28,4 @@ def implied() -> IdentifiedModel:
 @pytest.fixture(scope="session")
 def extended_design(implied: IdentifiedModel) -> Design:
     chosen = printed()["extended"]
-    return design_extended(implied, chosen["reference"]["omega"], chosen["a"], chosen["e"], chosen["f"])
+    return design_extended(implied, [chosen["reference"]["omega"]], chosen["a"], [(chosen["e"], chosen["f"])])

@@ -6,12 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from design.anti_windup import beta_grid, optimal_gamma, second_order
+from design.anti_windup import second_order
 from design.block import plant_block, plant_numerator
 from design.contract import Design
 from design.delay_free import design_delay_free
 from design.internal_model import internal_model
 from design.mixed_sensitivity import mixed_sensitivity
+from design.printed_optimum import beta_grid, optimal_gamma
 from experiments.claims_inputs import rounded_inputs
 from experiments.claims_parameters import table_2_1
 from experiments.claims_runs import least_peak_error
@@ -78,7 +79,7 @@ def test_lambda_has_no_term_in_s(implied: IdentifiedModel):
 
 
 def test_one_plus_F_vanishes_at_the_reference_frequency(extended_design: Design):
-    s = 1j * extended_design.reference_omega
+    s = 1j * extended_design.reference_omegas[0]
     assert abs(1 + complex(extended_design.blocks["F"](s))) < 1e-13
 
 
@@ -202,7 +203,7 @@ def test_swapped_pid_gains_do_what_the_text_says(pid_runs: pd.DataFrame):
 
 @pytest.fixture(scope="module")
 def reference() -> Reference:
-    return thesis_reference("extended", printed()["extended"]["reference"]["omega"])
+    return thesis_reference("extended", [printed()["extended"]["reference"]["omega"]])
 
 
 @pytest.fixture(scope="module")
@@ -213,7 +214,7 @@ def outcomes(extended_design: Design, reference: Reference) -> pd.DataFrame:
     for limit in (10.6, 11.0, 12.0, 12.5, 12.9, 12.96, 13.0, 14.0, 15.0, 17.0, 19.4, 20.0, 25.0, 40.0):
         bare, thesis = (
             simulate(design_loop(extended_design, reference, kind), (-limit, limit), time_s)
-            for kind in (None, extended_design.thesis_anti_windup())
+            for kind in (None, extended_design.compensator("thesis"))
         )
         rows.append(
             {
@@ -244,6 +245,6 @@ def test_no_limit_gives_a_recovery_after_4_46_s_to_zero_error(outcomes: pd.DataF
 
 
 def test_the_limit_that_4_s_imply_is_near_12_96(extended_design: Design, reference: Reference):
-    required = reference.amplitude / abs(complex(extended_design.loop_plant(1j * reference.omega)))
+    required = reference.required(extended_design.loop_plant)
     loop = design_loop(extended_design, reference, None)
     assert limit_for_last_saturation(loop, 4.0, required, 20.0) == pytest.approx(12.96, abs=0.01)

@@ -92,7 +92,7 @@ def test_chapter_4_over_one_plus_F(name: str, extended_design: Design, implied: 
     """
     plant, T_so, K = implied.plant, extended_design.blocks["T_so"], extended_design.blocks["K"]
     text: PrintedFunction = getattr(printed_text, name)
-    rest = rest_of_one_plus_F(T_so, plant.delay_s, extended_design.reference_omega)
+    rest = rest_of_one_plus_F(T_so, plant.delay_s, extended_design.reference_omegas[0])
 
     def exact(s: np.ndarray) -> np.ndarray:
         if name == "G_A_4":

@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 from matplotlib.figure import Figure
 
+from design.anti_windup import second_order
 from design.block import Block
 from design.contract import Design
 from identification.files import InputError
@@ -94,12 +95,25 @@ def design_of(kind: str) -> Design:
         kind=kind,
         plant=plant_of(1),
         additive_bound=SIMPLE,
-        reference_omega=1.5,
+        reference_omegas=(1.5,),
         blocks={"K": Block(1.0, (), (1 + 0j,)), "T_so": Block(1.0, (), (-4 + 0j, -1 + 2j, -1 - 2j))},
         hinf={"gamma": 0.375, "gamma_lower": 0.3125} if kind == "delay-free" else None,
         anti_windup={
-            "thesis": {"alpha": 0.03, "beta": 0.02, "gamma": 48.5, **judged},
-            "corrected": {"rate": 1.75, **judged, "popov_sector": 1.0, "theta2_stable": True},
+            "thesis": {
+                "alpha": 0.03,
+                "beta": 0.02,
+                "gamma": 48.5,
+                **judged,
+                **second_order(0.03, 0.02, 48.5).to_dict(),
+            },
+            "corrected": {
+                "sector": 0.75,
+                "recovery_s": 1.75,
+                **judged,
+                "popov_sector": 1.0,
+                "theta2_stable": True,
+                **second_order(0.5, 0.5, -1.0).to_dict(),
+            },
         },
         parameters={},
     )
@@ -198,7 +212,7 @@ W_a = 0.3 (1 + s/40) / (1 + 2 0.2 s/60 + (s/60)^2)
 It touches day_0.csv at 55.5 rad/s
 = 0.375, no stabilising controller below 0.3125. K itself is UNSTABLE
 poles of T_so -1+2j, -1-2j, -4
-gamma = 48.5 by (2.23), corrected with the rate 1.75 1/s
+gamma = 48.5 by (2.23); corrected for the sector 0.75, recovery in 1.75 s
 The least f of (2.23) over beta is 0.0312
 exceeds the limits of +-6.5
 no anti-windup diverges

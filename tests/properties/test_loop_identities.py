@@ -7,13 +7,13 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from design.anti_windup import AntiWindup, second_order, washout
+from design.anti_windup import AntiWindup, second_order
 from design.contract import Design
 from experiments.closed_loop import simulate
 from experiments.loops import design_loop
 from experiments.metrics import last_saturation
 from experiments.pade import with_pade
-from experiments.scenarios import Reference, thesis_reference
+from experiments.scenarios import sinusoid, thesis_reference
 
 LIMITS = st.floats(8.0, 40.0)
 FREE = (-np.inf, np.inf)
@@ -21,7 +21,7 @@ quick = settings(max_examples=8, deadline=None, suppress_health_check=[HealthChe
 
 
 def compensator(design: Design, kind: str, gamma: float) -> AntiWindup:
-    return second_order(0.05, 0.025, gamma) if kind == "thesis" else washout(design.additive_bound, 4.0)
+    return second_order(0.05, 0.025, gamma) if kind == "thesis" else design.compensator("corrected")
 
 
 @pytest.mark.parametrize("kind", ["thesis", "corrected"])
@@ -33,7 +33,7 @@ def test_y_plus_y_d_is_the_linear_response(
 ) -> None:
     """Lemma 2: y_lin = G_A u_lin, saturation or not; and v is the control of the linear loop."""
     design = request.getfixturevalue(which)
-    loop = design_loop(design, Reference(50.0, omega, 0.4, offset), compensator(design, kind, gamma))
+    loop = design_loop(design, sinusoid(50.0, omega, 0.4, offset), compensator(design, kind, gamma))
     t = np.linspace(0, 3, 301)
     saturated, linear = simulate(loop, (-limit, limit), t), simulate(loop, FREE, t)
     assume(len(saturated.events_s) > 0)
@@ -46,11 +46,11 @@ def test_y_plus_y_d_is_the_linear_response(
 @quick
 @given(limit=LIMITS)
 def test_without_saturation_every_anti_windup_is_the_same(extended_design: Design, limit: float) -> None:
-    reference = Reference(0.02 * limit, 1.5, 0.0, 0.0)
+    reference = sinusoid(0.02 * limit, 1.5, 0.0, 0.0)
     t = np.linspace(0, 2, 101)
     runs = [
         simulate(design_loop(extended_design, reference, kind), (-limit, limit), t)
-        for kind in (None, extended_design.thesis_anti_windup(), extended_design.corrected_anti_windup())
+        for kind in (None, extended_design.compensator("thesis"), extended_design.compensator("corrected"))
     ]
     for run in runs:
         assert len(run.events_s) == 0
@@ -62,7 +62,7 @@ def test_loop_is_homogeneous(extended_design: Design) -> None:
     t = np.linspace(0, 3, 301)
     small, large = (
         simulate(
-            design_loop(extended_design, Reference(c * 50.0, 1.5, 1.2, 0.0), extended_design.thesis_anti_windup()),
+            design_loop(extended_design, sinusoid(c * 50.0, 1.5, 1.2, 0.0), extended_design.compensator("thesis")),
             (-c * 12.0, c * 12.0),
             t,
         )
@@ -74,29 +74,29 @@ def test_loop_is_homogeneous(extended_design: Design) -> None:
 
 def test_offset_is_the_integral_of_what_the_actuator_left_out(extended_design: Design) -> None:
     """y - r -> -K (1 + gamma) * integral of u_tilde: the thesis's lasting offset; none with theta1~(0) = -1."""
-    reference = thesis_reference("extended", 1.5)
+    reference = thesis_reference("extended", [1.5])
     t = np.linspace(0, 25, 250_001)
-    kind = extended_design.thesis_anti_windup()
+    kind = extended_design.compensator("thesis")
     run = simulate(design_loop(extended_design, reference, kind), (-12.0, 12.0), t)
     excess = np.trapezoid(run.control - run.saturated_control, t)
     gain = extended_design.plant.gain * float(kind.one_plus(0j).real)
     error = run.outputs["error"][-1]
     assert abs(error) > 10
     assert error == pytest.approx(gain * excess, rel=1e-3)  # trapezoids of a kinked signal
-    corrected = design_loop(extended_design, reference, extended_design.corrected_anti_windup())
+    corrected = design_loop(extended_design, reference, extended_design.compensator("corrected"))
     assert abs(simulate(corrected, (-12.0, 12.0), np.array([0.0, 25.0])).outputs["error"][-1]) < 1e-6
 
 
 def test_last_saturation_without_anti_windup(extended_design: Design) -> None:
     """8.03 s, 3.80 s and 1.84 s under limits of 12, 13 and 15, known from an independent program."""
-    loop = design_loop(extended_design, thesis_reference("extended", 1.5), None)
+    loop = design_loop(extended_design, thesis_reference("extended", [1.5]), None)
     times = [last_saturation(simulate(loop, (-limit, limit), np.array([0.0, 20.0]))) for limit in (12.0, 13.0, 15.0)]
     np.testing.assert_allclose(times, [8.03, 3.80, 1.84], atol=0.005)
 
 
 def test_pade_converges_to_the_exact_dead_time(extended_design: Design) -> None:
     """Section 4.2: "larger n gives more accurate equivalent of the dead-time"."""
-    loop = design_loop(extended_design, thesis_reference("extended", 1.5), None)
+    loop = design_loop(extended_design, thesis_reference("extended", [1.5]), None)
     t = np.linspace(0, 3, 301)
     exact = simulate(loop, (-15.0, 15.0), t).outputs["output"]
     approximate = [simulate(with_pade(loop, order), (-15.0, 15.0), t).outputs["output"] for order in (1, 2, 3)]
@@ -106,10 +106,10 @@ def test_pade_converges_to_the_exact_dead_time(extended_design: Design) -> None:
 
 def test_chapter_two_without_anti_windup_does_not_follow(delay_free_design: Design) -> None:
     """Fig. 2.14; and the corrected compensator keeps the error within what the limit allows."""
-    reference = thesis_reference("delay-free", delay_free_design.reference_omega)
+    reference = thesis_reference("delay-free", delay_free_design.reference_omegas)
     t = np.linspace(0, 24, 2401)
     without = simulate(design_loop(delay_free_design, reference, None), (-10.0, 10.0), t).outputs["error"]
-    kind = delay_free_design.corrected_anti_windup()
+    kind = delay_free_design.compensator("corrected")
     corrected = simulate(design_loop(delay_free_design, reference, kind), (-10.0, 10.0), t).outputs["error"]
     assert np.abs(without[t > 20]).max() > 50
     assert np.abs(corrected[t > 20]).max() < 5
@@ -117,9 +117,8 @@ def test_chapter_two_without_anti_windup_does_not_follow(delay_free_design: Desi
 
 def test_chapter_two_hides_the_plants_integrator(delay_free_design: Design) -> None:
     """C = K A/Lambda has a zero where the plant has its pole: P S keeps the pole at 0, as Lemma 1 (A stable) warns."""
-    from design.delay_free import controller
 
-    C = controller(delay_free_design)
+    C = delay_free_design.controller_parts()[0]
     assert 0j in C.zeros
     P = delay_free_design.plant.without_delay()
     s = np.array([1e-6, 1e-7])

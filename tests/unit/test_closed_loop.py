@@ -11,7 +11,7 @@ from experiments import taylor
 from experiments.closed_loop import DivergenceError, SaturatedLoop, simulate
 from experiments.crossings import first_exit
 from experiments.loops import design_loop, pid_loop
-from experiments.scenarios import PidBenchmark, Reference, thesis_reference
+from experiments.scenarios import PidBenchmark, sinusoid, thesis_reference
 from identification.files import InputError
 
 FREE = (-np.inf, np.inf)
@@ -102,10 +102,10 @@ def test_first_exit_finds_the_first_of_close_roots() -> None:
 def test_extended_loop_agrees_with_the_independent_integrator(extended_design: Design, kind: str) -> None:
     anti_windup = {
         "none": None,
-        "thesis": extended_design.thesis_anti_windup(),
-        "corrected": extended_design.corrected_anti_windup(),
+        "thesis": extended_design.compensator("thesis"),
+        "corrected": extended_design.compensator("corrected"),
     }[kind]
-    loop = design_loop(extended_design, thesis_reference("extended", 1.5), anti_windup)
+    loop = design_loop(extended_design, thesis_reference("extended", [1.5]), anti_windup)
     # y is delayed: watch the plant's state behind it as well
     loop.outputs["p"] = (loop.Z[0], np.zeros(3))  # type: ignore[index]
     t = np.linspace(0, 0.7, 71)
@@ -119,7 +119,7 @@ def test_extended_loop_agrees_with_the_independent_integrator(extended_design: D
 
 @pytest.mark.parametrize("limit", [8.0, 12.0, 20.0, 40.0])
 def test_step_and_order_do_not_matter(extended_design: Design, limit: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    loop = design_loop(extended_design, thesis_reference("extended", 1.5), extended_design.thesis_anti_windup())
+    loop = design_loop(extended_design, thesis_reference("extended", [1.5]), extended_design.compensator("thesis"))
     t = np.linspace(0, 6, 601)
     coarse = simulate(loop, (-limit, limit), t).outputs["output"]
     original = taylor.integrate
@@ -137,7 +137,7 @@ def test_step_and_order_do_not_matter(extended_design: Design, limit: float, mon
 def test_linear_steady_state_is_the_frequency_response(extended_design: Design) -> None:
     # another frequency than the design's, where the error does not vanish: e = S r in the steady state
     omega = 4.0
-    loop = design_loop(extended_design, Reference(3.0, omega, 0.3, 0.0), None)
+    loop = design_loop(extended_design, sinusoid(3.0, omega, 0.3, 0.0), None)
     t = np.linspace(0, 30, 3001)
     error = simulate(loop, FREE, t).outputs["error"]
     s = 1j * omega

@@ -1,0 +1,141 @@
+"""The audit of a design in words and tables, as the command line prints it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from design.audit import Audit
+from design.contract import Design
+from design.robustness import Margin, Margins
+from identification.plant import PlantModel
+
+
+def audit_text(design: Design, found: Audit, windup: float) -> str:
+    """What an audit found.
+
+    Parameters
+    ----------
+    design
+        The audited design.
+    found
+        Of :func:`design.audit.audit`.
+    windup
+        Integral of u - sat(u) in input unit times second, for the lasting offset.
+    """
+    omegas = ", ".join(f"{omega:g}" for omega in design.reference_omegas)
+    lines = [f"{design.kind} design, reference at {omegas} rad/s, {_plant_in_words(design.loop_plant)}", ""]
+    lines += ["The linear loop" + (", its dead time exact" if design.loop_plant.delay_s else "")]
+    roots, hidden = found.roots.roots, found.roots.hidden
+    lines.append(f"  rightmost characteristic roots  {_roots(roots[~hidden])}")
+    lines.append(f"  cancelled between the blocks    {_roots(roots[hidden]) or 'none'}")
+    lines += _margin_lines(found.margins)
+    lines.append(
+        f"  |W_a/P| at the reference        {found.tracking_floor:.4g}: no controller that follows it has a smaller "
+        "peak"
+    )
+    lines.append(
+        f"  within W_a                      dead times off by up to {1e3 * found.covered_delay_s:.4g} ms; no other "
+        "gain of "
+        "the integrator"
+    )
+    if found.same_controller is not None:
+        lines.append(f"  C_aw = C_s                      to {found.same_controller:.1g}")
+    if found.with_delay is not None:
+        lines += ["", f"The same controller on the plant with its dead time of {1e3 * design.plant.delay_s:g} ms"]
+        lines += _margin_lines(found.with_delay)
+    if found.infimum is not None and design.hinf is not None:
+        hinf = design.hinf
+        lines += [
+            "",
+            "H-infinity stabiliser, ||[W1 S; W2 T]||",
+            f"  of this K                       {hinf['gamma']:.6g}",
+            f"  infimum of (2.8)                in [{found.infimum.lower:.6g}, {found.infimum.upper:.6g}], its upper "
+            "end by a "
+            f"K whose loop decays with {found.infimum.decay_rate:.3g} 1/s",
+            f"    no K below                    {found.infimum.reason}",
+            f"  with a decay of {hinf['decay_rate']:<15.4g} in [{hinf['gamma_line_lower']:.6g}, "
+            f"{hinf['gamma_line']:.6g}] on "
+            "that line",
+            f"    no K below                    {hinf['line_reason']}",
+        ]
+    lines += ["", "Anti-windup", *_columns(_anti_windup_rows(found, windup))]
+    alpha, beta, gamma, f = found.least_f
+    bandwidth = design.anti_windup["corrected"]["bandwidth"]
+    lines += [
+        "",
+        f"The best of (2.23) with no pole beyond {bandwidth:g} rad/s: alpha = {alpha:.4g} s, beta = {beta:.4g} s, "
+        "gamma = "
+        f"{gamma:.4g}, f = {f:.4g}.",
+        "Without such a bound on the poles there is none: f vanishes as alpha, beta -> 0 and gamma -> -1.",
+    ]
+    return "\n".join(lines)
+
+
+def _plant_in_words(plant: PlantModel) -> str:
+    zeros, poles = len(plant.zero_modes), len(plant.pole_modes)
+    return f"plant of gain {plant.gain:g}, {zeros} zero and {poles} pole modes, dead time {1e3 * plant.delay_s:g} ms"
+
+
+def _roots(roots: np.ndarray) -> str:
+    """Roots by decreasing real part, conjugates once, and how often where more than once."""
+    said = Counter(
+        f"{root.real:.4g} +- {root.imag:.4g}j" if root.imag else f"{root.real:.4g}" for root in roots if root.imag >= 0
+    )
+    return ", ".join(root if count == 1 else f"{root} ({count} times)" for root, count in said.items())
+
+
+def _margin_lines(margins: Margins | str | None) -> Iterable[str]:
+    if not isinstance(margins, Margins):
+        return [f"  no margins                      {margins}"]
+    guarantee = (
+        "every plant within W_a is stable" if margins.is_guaranteed else "NO guarantee for the plants within W_a"
+    )
+    return [
+        f"  gain factors                    {_margin(margins.gain_down)} to {_margin(margins.gain_up)}",
+        f"  phase margin                    {_margin(margins.phase_deg, ' deg')}",
+        f"  true dead times                 {_delay(margins.delay_least_s)} to {_delay(margins.delay_greatest_s)}",
+        f"  modulus margin                  {_margin(margins.modulus)}",
+        f"  |W_a C S| at most               {_margin(margins.W_a_C_S)}: {guarantee}",
+    ]
+
+
+def _margin(margin: Margin, unit: str = "") -> str:
+    if margin.omega is None:
+        return "any" if np.isinf(margin.value) else f"{margin.value:g}"
+    return f"{margin.value:.4g}{unit} (at {margin.omega:.4g} rad/s)"
+
+
+def _delay(margin: Margin) -> str:
+    scaled = Margin(1e3 * margin.value, margin.omega)
+    return _margin(scaled, " ms") if margin.omega is not None else ("any" if np.isinf(margin.value) else "0")
+
+
+def _anti_windup_rows(found: Audit, windup: float) -> list[Sequence[str]]:
+    head = ("name", "f", "at rad/s", "Popov sector", "slope 1/s", "for all of W_a", "theta1~(0)", "theta2")
+    rows: list[Sequence[str]] = [(*head, f"offset of {windup:g}", "recovery s")]
+    for name, judged in found.anti_windup.items():
+        multiplier, sector = judged.popov_multiplier_s, found.robust_sector[name]
+        rows.append(
+            (
+                name,
+                f"{judged.f:.4g}",
+                f"{judged.f_omega:.4g}",
+                "any" if judged.popov_sector is None else f"{judged.popov_sector:.4g}",
+                f"{1 / multiplier:.4g}" if multiplier else "circle",
+                "none" if sector == 0 else ("any" if np.isinf(sector) else f"{sector:.4g}"),
+                f"{judged.theta1_tilde_at_zero:.4g}",
+                "stable" if judged.theta2_stable else "NOT stable",
+                "grows" if judged.lasting_offset is None else f"{judged.lasting_offset * windup:.4g}",
+                f"{judged.recovery_s:.4g}",
+            )
+        )
+    return rows
+
+
+def _columns(rows: Sequence[Sequence[str]]) -> Iterable[str]:
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    for row in rows:
+        yield "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()

@@ -1,0 +1,202 @@
+"""The corrected theta1~: 1 + theta1~ is zero at every plant pole that is not stable, and f is least for a sector."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linprog, minimize_scalar
+
+from design.anti_windup import AntiWindup, from_one_plus, uncertainty_cost
+from design.block import Block, bound_block, from_polynomial
+from design.frequency import frequency_grid
+from identification.files import InputError
+from identification.plant import AdditiveBound
+
+SETTLED = 0.01  # what is left of y_d after the recovery time
+TOLERANCE = 1e-4  # of f and of the sector, relative
+PER_DECADE = 200  # frequencies
+REAL_PART = 0.1  # least real part of n over the denominator of W_a on the axis, which keeps the zeros of n stable
+CHAINS = 9  # values of the fast pole that are tried before the best is refined
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """The corrected compensator, and what was asked of it.
+
+    Parameters
+    ----------
+    anti_windup
+        theta1~ and 1 + theta1~.
+    recovery_s
+        Time in seconds in which y_d falls to 1 % after the actuator has left saturation.
+    sector
+        Popov's condition holds for the dead zone in this sector, below 1.
+    bandwidth
+        In rad/s; no pole of theta1~ is faster.
+    f
+        ||W_a (1 + theta1~)||_inf.
+    f_lower
+        No n over the same poles meets the linear program's conditions (the sector raised by 2e-4) with a smaller f.
+    """
+
+    anti_windup: AntiWindup
+    recovery_s: float
+    sector: float
+    bandwidth: float
+    f: float
+    f_lower: float
+
+
+def corrected(
+    unstable: tuple[complex, ...], bound: AdditiveBound, recovery_s: float, sector: float, bandwidth: float
+) -> Corrected:
+    """The theta1~ of least f whose theta2 is stable, for a stated sector, recovery time and bandwidth.
+
+        1 + theta1~ = prod(s - p_i)/(s + rate)^q * n(s)/(s + b)^N,   rate = ln(100)/recovery_s,  rate <= b <= bandwidth,
+
+    p_i being the q plant poles outside the open left half plane, N the order of W_a, n monic of degree N.
+
+    Parameters
+    ----------
+    unstable
+        Poles of the plant with Re s >= 0 in rad/s, each as often as it is multiple; closed under conjugation.
+    bound
+        W_a.
+    recovery_s
+        In seconds, positive.
+    sector
+        k of Theorem 2.3.1, between 0 and 1: with limits +-L the dead zone lies in it as long as |u| <= L/(1 - k).
+    bandwidth
+        In rad/s, greater than the rate.
+
+    Raises
+    ------
+    InputError
+        A number is out of its range, or no such theta1~ meets the sector.
+
+    Notes
+    -----
+    The class is ours; the thesis has (2.23) only. theta2 = P (1 + theta1~) is stable if and only if 1 + theta1~ has
+    these zeros. Without a bandwidth there is no optimum: s/(s + b) meets every sector below 1, and its f vanishes
+    as b grows.
+
+    For a given b f and Popov's condition are convex in the coefficients of n, and with the multiplier 0 (the
+    circle criterion, which suffices) they become a linear program over half planes: cuts are added where a
+    solution violates |W_a (1 + theta1~)| <= f or Re theta1~ + 1/k >= 0 most, until none does by more than TOLERANCE.
+    A third condition, Re n/d >= REAL_PART with d the monic denominator of W_a, keeps the zeros of n stable: the
+    control rings with them as long as the actuator is saturated.
+    Each program is a relaxation, so that its value is a proved lower bound. b is found by a search on a line.
+    """
+    if not (np.isfinite([recovery_s, sector, bandwidth]).all() and recovery_s > 0 and 0 < sector < 1):
+        raise InputError(
+            f"the recovery time is {recovery_s:g} s and the sector {sector:g}; "
+            "expected a positive time and 0 < sector < 1"
+        )
+    rate = float(np.log(1 / SETTLED)) / recovery_s
+    if not bandwidth > rate:
+        raise InputError(
+            f"the bandwidth of the anti-windup is {bandwidth:g} rad/s; expected more than {rate:g}, which the recovery "
+            f"in {recovery_s:g} s takes"
+        )
+
+    def least(logarithm: float) -> float:
+        return _Program(unstable, bound, rate, float(np.exp(logarithm)), sector).solve()[0]
+
+    trials = np.linspace(np.log(rate), np.log(bandwidth), CHAINS)
+    values = [least(trial) for trial in trials]
+    k = int(np.argmin(values))
+    if not np.isfinite(values[k]):
+        raise InputError(
+            f"no theta1~ with poles from {rate:g} to {bandwidth:g} rad/s meets the sector {sector:g}; "
+            "expected a smaller sector or a slower recovery"
+        )
+    found = minimize_scalar(
+        least, bounds=(trials[max(k - 1, 0)], trials[min(k + 1, CHAINS - 1)]), method="bounded", options={"xatol": 1e-3}
+    )
+    best = min((values[k], trials[k]), (float(found.fun), float(found.x)))[1]
+    program = _Program(unstable, bound, rate, float(np.exp(best)), sector)
+    f_lower, coefficients = program.solve()
+    kind = program.compensator(coefficients)
+    return Corrected(kind, recovery_s, sector, bandwidth, uncertainty_cost(bound, kind.one_plus)[0], f_lower)
+
+
+class _Program:
+    """The linear program over the coefficients x of n(s) = s^N + sum x_j b^(N - j) s^j, for one b."""
+
+    def __init__(self, unstable: tuple[complex, ...], bound: AdditiveBound, rate: float, b: float, sector: float):
+        W_a = bound_block(bound)
+        self.fixed = Block(1.0, unstable, (complex(-rate),) * len(unstable))
+        self.b, self.order, self.sector = b, bound.order, sector
+        roots = (*W_a.zeros, *W_a.poles, *self.fixed.zeros, complex(-rate), complex(-b))
+        self.omega = frequency_grid(roots, PER_DECADE)
+        s = 1j * self.omega
+        powers = (s[:, None] / b) ** np.arange(self.order + 1)
+        basis = self.fixed(s)[:, None] * powers / (1 + s[:, None] / b) ** self.order
+        self.basis, self.monic = basis[:, :-1], basis[:, -1]
+        self.W_a = W_a(s)
+        # n in units of W_a's monic denominator
+        scale = self.b**self.order / np.prod(s[:, None] - np.array(W_a.poles), axis=1)
+        self.shape, self.shape_monic = scale[:, None] * powers[:, :-1], scale * powers[:, -1]
+
+    def solve(self) -> tuple[float, np.ndarray]:
+        """The least f, to TOLERANCE from below, and the coefficients; infinite and empty when nothing is feasible."""
+        rows, limits = [], []
+
+        def bound_magnitude(at: np.ndarray, direction: np.ndarray) -> None:
+            weighted = direction * self.W_a[at]
+            rows.append(np.column_stack([(weighted[:, None] * self.basis[at]).real, -np.ones(len(at))]))
+            limits.append(-(weighted * self.monic[at]).real)
+
+        def bound_sector(at: np.ndarray) -> None:
+            rows.append(np.column_stack([-self.basis[at].real, np.zeros(len(at))]))
+            limits.append(self.monic[at].real - 1 + (1 - 2 * TOLERANCE) / self.sector)
+
+        def bound_phase(at: np.ndarray) -> None:
+            rows.append(np.column_stack([-self.shape[at].real, np.zeros(len(at))]))
+            limits.append(self.shape_monic[at].real - REAL_PART)
+
+        start = np.arange(0, len(self.omega), 20)
+        for direction in np.exp(0.25j * np.pi * np.arange(8)):
+            bound_magnitude(start, np.full(len(start), direction))
+        bound_sector(start)
+        bound_phase(start)
+        for _ in range(60):
+            found = linprog(
+                np.append(np.zeros(self.order), 1.0),
+                np.vstack(rows),
+                np.concatenate(limits),
+                bounds=[(None, None)] * self.order + [(0, None)],
+                method="highs",
+            )
+            if found.status == 2:
+                return np.inf, np.empty(0)
+            if found.x is None:
+                raise InputError(f"the linear program for theta1~ was not solved ({found.message})")
+            x, f = found.x[:-1], float(found.x[-1])
+            one_plus = self.monic + self.basis @ x
+            magnitude, real = np.abs(self.W_a * one_plus), one_plus.real - 1 + 1 / self.sector
+            phase = (self.shape_monic + self.shape @ x).real
+            above, below, turned = (
+                magnitude > f * (1 + TOLERANCE),
+                real < TOLERANCE / self.sector,
+                phase < (1 - TOLERANCE) * REAL_PART,
+            )
+            if not (above.any() or below.any() or turned.any()):
+                break
+            peaks = np.flatnonzero(above & _local_maximum(magnitude))
+            bound_magnitude(peaks, np.exp(-1j * np.angle((self.W_a * one_plus)[peaks])))
+            bound_sector(np.flatnonzero(below & _local_maximum(-real)))
+            bound_phase(np.flatnonzero(turned & _local_maximum(-phase)))
+        return f, x
+
+    def compensator(self, x: np.ndarray) -> AntiWindup:
+        """theta1~ and 1 + theta1~ with these coefficients."""
+        n = from_polynomial(np.append(1.0, x[::-1]), self.b)
+        poles = self.fixed.poles + (complex(-self.b),) * self.order
+        return from_one_plus(Block(1.0, self.fixed.zeros + n.zeros, poles))
+
+
+def _local_maximum(values: np.ndarray) -> np.ndarray:
+    padded = np.concatenate([[-np.inf], values, [-np.inf]])
+    return np.asarray((values >= padded[:-2]) & (values >= padded[2:]))

@@ -1,0 +1,110 @@
+"""The printed theta1~ (2.23) of least f: by the thesis's own procedure, and over all of alpha, beta and gamma."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize, minimize_scalar
+
+from design.anti_windup import second_order, uncertainty_cost
+from design.block import bound_block
+from design.frequency import frequency_grid
+from identification.plant import AdditiveBound
+
+
+def optimal_gamma(bound: AdditiveBound, alpha: float, beta: float) -> tuple[float, float]:
+    """The gamma that minimises f(gamma) for given alpha and beta, and that minimum.
+
+    f is convex in gamma, being the largest of |W_a + gamma W_a h| over omega, so that the minimum is global;
+    gamma > -1 keeps the zeros of 1 + theta1~ in the open left half plane.
+    """
+
+    def cost(gamma: float) -> float:
+        return uncertainty_cost(bound, second_order(alpha, beta, gamma).one_plus)[0]
+
+    upper = _largest_gamma(bound, alpha, beta)
+    found = minimize_scalar(cost, bounds=(-1.0, upper), method="bounded", options={"xatol": 1e-8 * upper})
+    return float(found.x), float(found.fun)
+
+
+def _largest_gamma(bound: AdditiveBound, alpha: float, beta: float) -> float:
+    """Past twice the gamma that puts the zeros at W_a's peak, f grows with gamma."""
+    return 4 * (1 + bound.resonance.omega**2 * alpha * beta)
+
+
+def thesis_choice(bound: AdditiveBound) -> tuple[float, float, float]:
+    """alpha, beta, gamma by the thesis's own procedure (section 2.4).
+
+    alpha = 1/corner removes the zero of W_a; beta is the best of 2 alpha, alpha, alpha/2, alpha/4 (printed:
+    1/10 ... 1/80, a coarse grid); gamma minimises f.
+    """
+    alpha = 1 / bound.corner
+    candidates = [(optimal_gamma(bound, alpha, beta), beta) for beta in beta_grid(alpha)]
+    (gamma, _), beta = min(candidates, key=lambda candidate: candidate[0][1])
+    return alpha, beta, gamma
+
+
+def beta_grid(alpha: float) -> tuple[float, ...]:
+    """The values of beta that Fig. 2.10 compares, as multiples of alpha."""
+    return 2 * alpha, alpha, alpha / 2, alpha / 4
+
+
+def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float, float]:
+    """The least f of (2.23) over alpha, beta and gamma together, no pole of theta1~ beyond a bandwidth.
+
+    Parameters
+    ----------
+    bound
+        W_a.
+    bandwidth
+        In rad/s; alpha and beta are at least 1/bandwidth.
+
+    Returns
+    -------
+    alpha, beta, gamma, f
+        alpha >= beta, in seconds.
+
+    Notes
+    -----
+    Without a bandwidth there is no optimum: with alpha, beta -> 0 and gamma -> -1 theta1~ tends to -1 at every
+    frequency where W_a is not small, and f to 0.
+
+    For given alpha and beta f is convex in gamma, see :func:`optimal_gamma`. Over the two time constants it is
+    not, so that a grid from 1/bandwidth to a hundred times the period of W_a's resonance, with f on fixed
+    frequencies, gives the starts; from the two best the exact f is minimised.
+    """
+    W_a = bound_block(bound)
+    omega = frequency_grid(W_a.zeros + W_a.poles, per_decade=30)
+    s, values = 1j * omega, W_a(1j * omega)
+    ends = 1 / bandwidth, max(100 / bound.resonance.omega, 100 / bandwidth)
+
+    def on_grid(alpha: float, beta: float) -> float:
+        slope = values / ((1 + alpha * s) * (1 + beta * s))
+        upper = _largest_gamma(bound, alpha, beta)
+        found = minimize_scalar(
+            lambda gamma: float(np.abs(values + gamma * slope).max()),
+            bounds=(-1.0, upper),
+            method="bounded",
+            options={"xatol": 1e-3 * upper},
+        )
+        return float(found.fun)
+
+    def exact(logarithms: np.ndarray) -> float:
+        alpha, beta = np.exp(logarithms)
+        return optimal_gamma(bound, float(alpha), float(beta))[1]
+
+    constants = np.geomspace(*ends, 16)
+    starts = sorted((on_grid(alpha, beta), alpha, beta) for alpha in constants for beta in constants if beta <= alpha)
+    polished = [
+        minimize(
+            exact,
+            np.log(start[1:]),
+            method="Nelder-Mead",
+            bounds=[(float(np.log(ends[0])), float(np.log(ends[1])))] * 2,
+            options={"xatol": 1e-4, "fatol": 1e-8},
+        )
+        for start in starts[:2]
+    ]
+    best = min(polished, key=lambda found: found.fun)
+    beta, alpha = sorted(float(constant) for constant in np.exp(best.x))
+    gamma, f = optimal_gamma(bound, alpha, beta)
+    return alpha, beta, gamma, f

@@ -1,0 +1,160 @@
+"""The audit: what it computes, what it prints, and a theta1~ of the user's own."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from design.__main__ import main
+from design.audit import audit
+from design.contract import Design, read_design
+from design.delay_free import design_delay_free
+from design.extended import design_extended
+from identification.model import IdentifiedModel
+from identification.plant import AdditiveBound, Mode, PlantModel
+
+
+@pytest.fixture
+def path(extended_design: Design, tmp_path: Path) -> Path:
+    path = tmp_path / "chapter3.json"
+    path.write_text(extended_design.to_json(), encoding="utf-8")
+    return path
+
+
+def run(*arguments: str) -> str:
+    result = CliRunner().invoke(main, list(arguments))
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_the_thesis_design(extended_design: Design) -> None:
+    found = audit(extended_design)
+    margins = found.margins
+    assert not isinstance(margins, str)
+    assert margins.W_a_C_S.value == pytest.approx(8.84, abs=5e-3)
+    assert margins.W_a_C_S.omega == pytest.approx(175, abs=0.1)
+    assert not margins.is_guaranteed
+    assert found.same_controller is not None
+    assert found.same_controller < 1e-7  # C_aw = C_s
+    assert found.robust_sector == {"thesis": 0.0, "corrected": 0.0}
+    assert found.anti_windup["thesis"].lasting_offset == pytest.approx(696.15, abs=0.01)
+    assert found.anti_windup["corrected"].lasting_offset == 0.0
+    assert found.least_f[3] == pytest.approx(1.36804, abs=1e-5)
+    visible = found.roots.roots[~found.roots.hidden]
+    np.testing.assert_allclose(visible[:2], [-1, -1], rtol=1e-6)
+    assert found.with_delay is None
+    assert found.infimum is None
+
+
+def test_the_redesign_is_guaranteed(implied: IdentifiedModel) -> None:
+    found = audit(design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9))
+    assert not isinstance(found.margins, str)
+    assert found.margins.is_guaranteed
+    assert 0 < found.robust_sector["corrected"] < 0.95
+    assert found.tracking_floor == pytest.approx(0.002329, rel=1e-3)
+
+
+def test_chapter_two_with_and_without_its_dead_time(delay_free_design: Design) -> None:
+    found = audit(delay_free_design)
+    assert not isinstance(found.margins, str)
+    assert not isinstance(found.with_delay, str)
+    assert found.with_delay is not None
+    assert found.with_delay.modulus.value < found.margins.modulus.value
+    assert found.infimum is not None
+    assert delay_free_design.hinf is not None
+    assert found.infimum.lower < found.infimum.upper < 1.01 * found.infimum.lower
+    assert found.infimum.upper < delay_free_design.hinf["gamma"]
+
+
+def test_a_dead_time_that_the_design_ignored_may_be_fatal(implied: IdentifiedModel) -> None:
+    plant = dataclasses.replace(implied.plant, delay_s=0.2)
+    found = audit(design_delay_free(dataclasses.replace(implied, plant=plant), 4.0, 1e-4))
+    assert isinstance(found.with_delay, str)
+    assert "roots in the right half plane" in found.with_delay
+
+
+@pytest.mark.parametrize(
+    ("plant", "omegas"),
+    [
+        (PlantModel(20.0, (), (), 0.02), [3.0]),
+        (PlantModel(-3.0, (Mode(50, 0.05),), (Mode(80, 0.03),), 0.004), [0.0]),
+        (PlantModel(0.7, (Mode(50, 0.05), Mode(150, 0.05)), (Mode(80, 0.03), Mode(190, 0.05)), 0.0), [0.5, 2.0]),
+    ],
+    ids=["no modes", "constant", "no delay, two frequencies"],
+)
+def test_other_plants(implied: IdentifiedModel, plant: PlantModel, omegas: list[float]) -> None:
+    bound = AdditiveBound.printed_form(0.0015 * abs(plant.gain), 20.0, 60.0, 0.05)
+    model = dataclasses.replace(implied, plant=plant, additive_bound=bound)
+    found = audit(design_extended(model, omegas, 4.0, [(2.0, 1.0)] * sum(omega > 0 for omega in omegas)))
+    assert not isinstance(found.margins, str)
+    assert found.same_controller is not None
+    assert found.same_controller < 1e-6
+    assert found.anti_windup["corrected"].lasting_offset == 0.0
+
+
+def test_what_is_printed(path: Path) -> None:
+    said = run("audit", str(path), "--windup", "2")
+    for part in (
+        "C_aw = C_s",
+        "8.84 (at 175 rad/s): NO guarantee",
+        "0 to 129.4 ms",
+        "NOT stable",
+        "1392",  # K (1 + gamma) times 2
+        "f = 1.368",
+    ):
+        assert part in said
+    assert "nan" not in said
+
+
+def test_what_is_printed_of_chapter_two(delay_free_design: Design, tmp_path: Path) -> None:
+    path = tmp_path / "chapter2.json"
+    path.write_text(delay_free_design.to_json(), encoding="utf-8")
+    said = run("audit", str(path))
+    for part in (
+        "on the plant with its dead time of 8.1 ms",
+        "infimum of (2.8)",
+        "spectral radius of X Y",
+        "cancelled",
+    ):
+        assert part in said
+
+
+def test_a_theta1_of_ones_own(path: Path, tmp_path: Path) -> None:
+    output = tmp_path / "mine.json"
+    run(
+        *("anti-windup", str(path), "--name", "mine", "--numerator=-25", "--denominator", "1, 25"),
+        *("--output", str(output)),
+    )
+    kind = read_design(output).compensator("mine")
+    assert kind.one_plus.zeros == (0j,)
+    assert kind.one_plus.poles == (-25 + 0j,)
+    assert "mine" in run("audit", str(output))
+
+
+@pytest.mark.parametrize(
+    ("options", "part"),
+    [
+        (["--name", "thesis", "--numerator", "1", "--denominator", "1 2"], "another name than none, thesis"),
+        (["--name", "x", "--numerator", "1 two", "--denominator", "1 2"], "--numerator is '1 two'"),
+        (["--name", "x", "--numerator", "1", "--denominator", ""], "--denominator is ''"),
+        (["--name", "x", "--numerator", "1 0", "--denominator", "1 2"], "strictly proper and stable"),
+        (["--name", "x", "--numerator", "1", "--denominator", "1 -2"], "strictly proper and stable"),
+    ],
+)
+def test_a_bad_theta1_is_refused(path: Path, tmp_path: Path, options: list[str], part: str) -> None:
+    output = tmp_path / "mine.json"
+    result = CliRunner().invoke(main, ["anti-windup", str(path), *options, "--output", str(output)])
+    assert result.exit_code == 2
+    assert part in result.output
+    assert not output.exists()
+
+
+def test_a_design_of_an_earlier_version_is_refused(path: Path) -> None:
+    path.write_text(path.read_text(encoding="utf-8").replace('"schema": 2', '"schema": 1'), encoding="utf-8")
+    result = CliRunner().invoke(main, ["audit", str(path)])
+    assert result.exit_code == 2
+    assert "schema is 1; expected 2" in result.output

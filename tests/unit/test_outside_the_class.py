@@ -1,0 +1,119 @@
+"""docs/outside_the_class.md: each of its statements as a test."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from design.audit import audit, covered_delay
+from design.block import Block, plant_block
+from design.contract import Design
+from design.extended import design_extended
+from design.quasi_polynomial import DelayLoop, roots_right_of
+from design.smith_predictor import stabiliser
+from identification.model import IdentifiedModel
+from identification.plant import AdditiveBound, Mode, PlantModel
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_every_test_that_the_page_names_exists() -> None:
+    text = (ROOT / "docs" / "outside_the_class.md").read_text(encoding="utf-8")
+    named = re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", text)
+    assert len(named) >= 7
+    for file, name in named:
+        assert f"def {name}(" in (ROOT / file).read_text(encoding="utf-8"), f"{file}::{name}"
+
+
+def loop_with_delay(design: Design, delay_s: float) -> DelayLoop:
+    P = plant_block(design.plant)
+    return DelayLoop(Block(P.gain, P.zeros, P.poles, delay_s), *design.controller_parts(), design.plant.delay_s)
+
+
+@pytest.mark.parametrize("delay_s", [0.0081, 0.05])
+def test_the_range_of_true_dead_times(implied: IdentifiedModel, delay_s: float) -> None:
+    model = dataclasses.replace(implied, plant=dataclasses.replace(implied.plant, delay_s=delay_s))
+    design = design_extended(model, [1.5], 4.0, [(2.0, 1.0)])
+    margins = audit(design).margins
+    assert not isinstance(margins, str)
+    least, greatest = margins.delay_least_s.value, margins.delay_greatest_s.value
+    assert least <= delay_s < greatest
+    for inside in np.linspace(least + 1e-6, greatest - 1e-6, 7):
+        assert roots_right_of(loop_with_delay(design, float(inside)), 0.0) == 0
+    assert roots_right_of(loop_with_delay(design, greatest * 1.001), 0.0) == 2
+    if least > 0:
+        assert roots_right_of(loop_with_delay(design, least * 0.999), 0.0) == 2
+
+
+def test_dead_times_within_the_bound(implied: IdentifiedModel) -> None:
+    plant, bound = implied.plant, implied.additive_bound
+    covered = covered_delay(plant, bound)
+    s = 1j * np.geomspace(1e-3, 1e4, 20000)
+    for factor, inside in ((0.999, True), (1.01, False)):
+        moved = dataclasses.replace(plant, delay_s=plant.delay_s + factor * covered)
+        assert bool(np.all(np.abs(moved(s) - plant(s)) <= np.abs(bound(s)))) == inside
+    # every phase is covered where W_a exceeds 2 |P|
+    assert covered_delay(PlantModel(1e-6, (), (), 0.1), AdditiveBound.printed_form(1.0, 1.0, 1e9, 1.0)) > 1e5
+
+
+def test_no_bound_covers_the_integrators_gain(implied: IdentifiedModel) -> None:
+    plant, bound = implied.plant, implied.additive_bound
+    for change in (1e-2, 1e-6):
+        moved = dataclasses.replace(plant, gain=plant.gain * (1 + change))
+        s = 1j * change * plant.gain / abs(complex(bound(0j))) * 0.5
+        assert abs(complex(moved(s) - plant(s))) > abs(complex(bound(s)))
+
+
+def test_an_unstable_pole_would_stay_as_a_hidden_mode() -> None:
+    """P = 1/(s - p) under C = (T/P)/(1 - T exp(-h s)): T exp(-h s) = 1 at p, and p is cancelled all the same."""
+    p, h, a = 0.5, 0.2, 3.0
+    # T(s) = (c s + d)/(s + a)^2 with T(0) = 1 and T(p) = exp(h p)
+    d = a**2
+    c = (np.exp(h * p) * (p + a) ** 2 - d) / p
+    T = Block(c, (complex(-d / c),), (complex(-a),) * 2)
+    P = Block(1.0, (), (complex(p),), h)
+    K = T * Block(1.0, (complex(p),))
+    assert abs(1 - complex(T(p)) * np.exp(-h * p)) < 1e-12
+    loop = DelayLoop(P, K, T, h)
+    assert complex(p) in loop.hidden
+    # what r and y see is stable: the characteristic equation without the hidden roots has no such root
+    assert roots_right_of(loop, 0.0) == 0
+
+
+def test_the_printed_predictor_is_for_one_integrator() -> None:
+    delay_s, s = 0.1, np.array([1e-3, 1e-4, 1e-5])
+    one, two = -np.expm1(-delay_s * s) / s, -np.expm1(-delay_s * s) / s**2
+    np.testing.assert_allclose(one, delay_s, rtol=1e-4)
+    np.testing.assert_allclose(two * s, delay_s, rtol=1e-4)  # a pole at 0
+
+
+def test_a_limited_input_holds_an_unstable_plant_near_zero_only() -> None:
+    """y' = p y + K u with the best u, -L sign(y): from |y| > K L/p it grows, from below it returns."""
+    p, K, L = 0.7, 2.0, 3.0
+    edge = K * L / p
+    for factor, grows in ((1.01, True), (0.99, False)):
+        start = factor * edge
+        assert (p * start - K * L > 0) == grows
+        later = edge + (start - edge) * np.exp(p * 5.0)  # closed form while u = -L
+        assert (later > start) == grows
+
+
+def test_the_approximate_inverse_is_stable_for_small_epsilon_only(implied: IdentifiedModel) -> None:
+    """(3.2) with R_eps: the characteristic equation is no longer (3.5), and the audit counts its roots."""
+    stable = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=1e-3)
+    assert not isinstance(audit(stable).margins, str)
+    unstable = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=1.0)
+    assert "right half plane" in str(audit(unstable).margins)
+
+
+def test_a_plant_with_two_integrators_is_refused_with_the_reason(implied: IdentifiedModel) -> None:
+    plant = PlantModel(1.0, (Mode(50.0, 0.1),), (Mode(80.0, 0.1),), 0.01, integrators=2)
+    model = dataclasses.replace(implied, plant=plant)
+    with pytest.raises(ValueError, match=r"has 2 integrators; the design expects exactly one.*\(3\.2\) and \(3\.16\)"):
+        design_extended(model, [1.5], 4.0, [(2.0, 1.0)])
+    with pytest.raises(ValueError, match="has 2 integrators"):
+        stabiliser(plant, Block(1.0, (), (-1 + 0j, -1 + 0j)))
