@@ -40,10 +40,11 @@ IN_FOLDERS := $(if $(FOLDERS),find -L $(FOLDERS) -maxdepth 1 -type f \
 LIMITS := $(if $(LIMIT),--limit $(LIMIT))
 
 NAMES := $(sort $(basename $(notdir $(wildcard paper_figures/fig_*.py))))
-DATA_NAMES := fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14 fig_4_01 fig_4_02 fig_4_03 fig_4_04
+DATA_NAMES := fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14 fig_4_01 fig_4_02 fig_4_03 fig_4_04 \
+	fig_a_01 fig_a_02 fig_a_03 fig_a_04
 FORMATS := pdf svg png txt
-DESIGNS := $(addprefix $(BUILD)/,design_delay_free.json design_extended.json)
-TABLES := additive_error f_gamma delay_free extended
+DESIGNS := $(addprefix $(BUILD)/,design_delay_free.json design_extended.json design_robust.json)
+TABLES := additive_error f_gamma delay_free extended trade_off interpolation robustness limits_delay_free limits_extended
 
 IDENTIFICATION := $(wildcard identification/*.py)
 CONTRACT := $(addprefix identification/,files.py plant.py model.py thesis.py) $(THESIS)
@@ -59,7 +60,7 @@ help: ## say what there is
 	@echo 'make refit ... FIT="--modes 1 --bound-order 3"    with options of python -m identification fit'
 	@echo 'make refit ... LIMIT=5    under other saturation limits than the thesis'"'"'s'
 
-figures: $(foreach format,$(FORMATS),$(NAMES:%=$(FIGURES)/%.$(format))) ## draw every figure of the thesis into build/figures
+figures: $(foreach format,$(FORMATS),$(NAMES:%=$(FIGURES)/%.$(format))) ## draw the thesis's figures and A.1 to A.4 into build/figures
 
 refit: ## fit SWEEPS="a.csv b.csv", design, simulate, draw and sum up for that plant into OUT
 	+@$(MAKE) --no-print-directory REFIT=yes BUILD='$(OUT)' MODEL= SWEEPS='$(SWEEPS)' NAMES='$(DATA_NAMES)' \
@@ -130,6 +131,11 @@ $(BUILD)/design_extended.json: $(MODEL_FILE) $(CHOICE) $(wildcard design/*.py) $
 	$(call attempt,$(PY) -m design extended $(CHOSEN) --reference-omega 1.5 --a 4 --e 2 --f 1 --output $@,$@,,\
 		$(basename $@))
 
+# The same with a roll-off, so that W_a guarantees the loop's stability.
+$(BUILD)/design_robust.json: $(MODEL_FILE) $(CHOICE) $(wildcard design/*.py) $(CONTRACT) | $(READY)
+	$(call attempt,$(PY) -m design extended $(CHOSEN) --reference-omega 1.5 --a 4 --e 2 --f 1 --robust-level 0.9 --output $@,\
+		$@,,$(basename $@))
+
 $(call tables,pid) &: experiments/pid.py $(ENGINE) $(THESIS) | $(READY)
 	$(PY) -m experiments pid --output $(RESULTS)
 
@@ -151,6 +157,29 @@ $(call tables,extended) &: \
 	$(call attempt,$(PY) -m experiments extended $< $(LIMITS) --output $(RESULTS),$(call tables,extended),$<,\
 		$(RESULTS)/extended)
 
+$(call tables,trade_off) &: $(BUILD)/design_extended.json experiments/trade_off.py | $(READY)
+	$(call attempt,$(PY) -m experiments trade-off $< --output $(RESULTS),$(call tables,trade_off),$<,\
+		$(RESULTS)/trade_off)
+
+INTERPOLATION := $(call tables,interpolation) $(RESULTS)/interpolation_map.csv
+$(INTERPOLATION) &: $(BUILD)/design_extended.json experiments/interpolation_regions.py | $(READY)
+	$(call attempt,$(PY) -m experiments interpolation $< --output $(RESULTS),$(INTERPOLATION),$<,\
+		$(RESULTS)/interpolation)
+
+ROBUSTNESS := $(BUILD)/design_extended.json $(BUILD)/design_robust.json
+$(call tables,robustness) &: $(ROBUSTNESS) experiments/robustness.py | $(READY)
+	$(call attempt,$(PY) -m experiments robustness $(ROBUSTNESS) --output $(RESULTS),$(call tables,robustness),$(ROBUSTNESS),\
+		$(RESULTS)/robustness)
+
+LIMITED := $(TRACKING) $(addprefix experiments/,physical_limits.py linear_programs.py cells.py)
+$(call tables,limits_delay_free) &: $(BUILD)/design_delay_free.json $(LIMITED) | $(READY)
+	$(call attempt,$(PY) -m experiments limits $< --output $(RESULTS),$(call tables,limits_delay_free),$<,\
+		$(RESULTS)/limits_delay_free)
+
+$(call tables,limits_extended) &: $(BUILD)/design_extended.json $(LIMITED) | $(READY)
+	$(call attempt,$(PY) -m experiments limits $< --output $(RESULTS),$(call tables,limits_extended),$<,\
+		$(RESULTS)/limits_extended)
+
 $(BUILD)/claims.csv $(BUILD)/claims.txt &: data/thesis/claims.csv $(wildcard experiments/*.py design/*.py) $(CONTRACT) | $(READY)
 	@mkdir -p $(BUILD)
 	$(PY) -m experiments claims --output $(BUILD) > $(BUILD)/claims.txt
@@ -163,11 +192,18 @@ $(eval $(call feeds,additive_error,fig_2_09))
 $(eval $(call feeds,f_gamma,fig_2_10 fig_2_11))
 $(eval $(call feeds,delay_free,fig_2_12 fig_2_13 fig_2_14))
 $(eval $(call feeds,extended,fig_4_01 fig_4_02 fig_4_03 fig_4_04))
+$(eval $(call feeds,trade_off,fig_a_01))
+$(eval $(call feeds,interpolation,fig_a_02))
+$(call drawing,fig_a_02): $(RESULTS)/interpolation_map.csv
+$(eval $(call feeds,robustness,fig_a_03))
+$(eval $(call feeds,limits_delay_free,fig_a_04))
+$(eval $(call feeds,limits_extended,fig_a_04))
 
 $(call drawing,fig_2_02 fig_2_03 fig_2_04): $(addprefix paper_figures/,pid.py panels.py captions.py)
 $(call drawing,fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14): $(addprefix paper_figures/,panels.py captions.py)
 $(call drawing,fig_2_10 fig_2_11): paper_figures/f_gamma.py
 $(call drawing,fig_4_01 fig_4_02 fig_4_03 fig_4_04): $(addprefix paper_figures/,extended.py panels.py captions.py)
+$(call drawing,fig_a_01 fig_a_02 fig_a_03 fig_a_04): $(addprefix paper_figures/,panels.py captions.py)
 
 DIAGRAMS := fig_2_01 fig_2_05 fig_2_06 fig_2_07 fig_2_08 fig_3_01 fig_3_02
 $(call drawing,$(DIAGRAMS)): paper_figures/block_diagrams.py

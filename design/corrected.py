@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog, minimize_scalar
+from scipy.optimize import linprog
 
 from design.anti_windup import AntiWindup, from_one_plus, uncertainty_cost
 from design.block import Block, bound_block, from_polynomial
@@ -14,10 +14,12 @@ from identification.files import InputError
 from identification.plant import AdditiveBound
 
 SETTLED = 0.01  # what is left of y_d after the recovery time
-TOLERANCE = 1e-4  # of f and of the sector, relative
+TOLERANCE = 1e-6  # of f, relative
+MARGIN = 2e-4  # by which the sector is raised, relative: what lies between the frequencies
 PER_DECADE = 200  # frequencies
 REAL_PART = 0.1  # least real part of n over the denominator of W_a on the axis, which keeps the zeros of n stable
-CHAINS = 9  # values of the fast pole that are tried before the best is refined
+TRIED = 9  # values of b
+HALVINGS = 6  # of the distance to the best one's neighbours
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,8 @@ def corrected(
     solution violates |W_a (1 + theta1~)| <= f or Re theta1~ + 1/k >= 0 most, until none does by more than TOLERANCE.
     A third condition, Re n/d >= REAL_PART with d the monic denominator of W_a, keeps the zeros of n stable: the
     control rings with them as long as the actuator is saturated.
-    Each program is a relaxation, so that its value is a proved lower bound. b is found by a search on a line.
+    Each program is a relaxation, so that its value is a proved lower bound. b is the best of a grid, halved around
+    the best one some times: a search by values alone would move the last digits from machine to machine.
     """
     if not (np.isfinite([recovery_s, sector, bandwidth]).all() and recovery_s > 0 and 0 < sector < 1):
         raise InputError(
@@ -100,23 +103,21 @@ def corrected(
             f"in {recovery_s:g} s takes"
         )
 
-    def least(logarithm: float) -> float:
-        return _Program(unstable, bound, rate, float(np.exp(logarithm)), sector).solve()[0]
-
-    trials = np.linspace(np.log(rate), np.log(bandwidth), CHAINS)
-    values = [least(trial) for trial in trials]
-    k = int(np.argmin(values))
-    if not np.isfinite(values[k]):
+    tried: dict[float, tuple[_Program, float, np.ndarray]] = {}
+    trials = np.linspace(np.log(rate), np.log(bandwidth), TRIED)
+    for _ in range(1 + HALVINGS):
+        for logarithm in trials:
+            program = _Program(unstable, bound, rate, float(np.exp(logarithm)), sector)
+            tried[float(logarithm)] = (program, *program.solve())
+        at = sorted(tried)
+        k = min(range(len(at)), key=lambda k: tried[at[k]][1])
+        trials = np.array([(at[k] + at[other]) / 2 for other in (k - 1, k + 1) if 0 <= other < len(at)])
+    program, f_lower, coefficients = tried[at[k]]
+    if not np.isfinite(f_lower):
         raise InputError(
             f"no theta1~ with poles from {rate:g} to {bandwidth:g} rad/s meets the sector {sector:g}; "
             "expected a smaller sector or a slower recovery"
         )
-    found = minimize_scalar(
-        least, bounds=(trials[max(k - 1, 0)], trials[min(k + 1, CHAINS - 1)]), method="bounded", options={"xatol": 1e-3}
-    )
-    best = min((values[k], trials[k]), (float(found.fun), float(found.x)))[1]
-    program = _Program(unstable, bound, rate, float(np.exp(best)), sector)
-    f_lower, coefficients = program.solve()
     kind = program.compensator(coefficients)
     return Corrected(kind, recovery_s, sector, bandwidth, uncertainty_cost(bound, kind.one_plus)[0], f_lower)
 
@@ -150,7 +151,7 @@ class _Program:
 
         def bound_sector(at: np.ndarray) -> None:
             rows.append(np.column_stack([-self.basis[at].real, np.zeros(len(at))]))
-            limits.append(self.monic[at].real - 1 + (1 - 2 * TOLERANCE) / self.sector)
+            limits.append(self.monic[at].real - 1 + (1 - MARGIN) / self.sector)
 
         def bound_phase(at: np.ndarray) -> None:
             rows.append(np.column_stack([-self.shape[at].real, np.zeros(len(at))]))
@@ -168,6 +169,7 @@ class _Program:
                 np.concatenate(limits),
                 bounds=[(None, None)] * self.order + [(0, None)],
                 method="highs",
+                options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
             )
             if found.status == 2:
                 return np.inf, np.empty(0)
@@ -179,7 +181,7 @@ class _Program:
             phase = (self.shape_monic + self.shape @ x).real
             above, below, turned = (
                 magnitude > f * (1 + TOLERANCE),
-                real < TOLERANCE / self.sector,
+                real < MARGIN / 2 / self.sector,
                 phase < (1 - TOLERANCE) * REAL_PART,
             )
             if not (above.any() or below.any() or turned.any()):

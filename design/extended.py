@@ -86,7 +86,9 @@ def design_extended(
     else:
         redesign = robust_free_part(model, wanted, pairs, robust_level)
         free = redesign.free
-        parameters |= {"robust_level": robust_level, "roll_off": redesign.rate, "roll_off_order": redesign.order}
+        parameters |= {"robust_level": robust_level, "roll_off_order": redesign.order}
+        if redesign.order:
+            parameters["roll_off"] = redesign.rate
     parameters["Q"] = {name: _attempt(design) for name, design in designs.items()}
 
     K_0, K_1, K = stabiliser(model.plant, free.T_so, inverse_epsilon)

@@ -28,7 +28,7 @@ class Redesign:
     free
         Q, C_0 and T_so.
     rate, order
-        T_so has ``order`` additional poles at -rate (rad/s).
+        T_so has ``order`` additional poles at -rate (rad/s); with none the design meets the level as it is.
     peak
         ||W_a C S||_inf.
     sensitivity
@@ -94,7 +94,7 @@ def robust_free_part(
     rates = np.geomspace(fast, slow, int(PER_DECADE * np.log10(fast / slow)) + 2)
     for order in range(excess, excess + MOST_POLES + 1):
         above = None
-        for rate in rates:
+        for rate in rates if order else rates[:1]:
             found = attempt(float(rate), order)
             best = min(best, found.peak)
             if found.peak <= level:

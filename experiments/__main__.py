@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 import numpy as np
 import pandas as pd
+from tqdm import tqdm
 
 from design.anti_windup import AntiWindup, printed_form
 from design.contract import Design, read_design
@@ -17,11 +18,14 @@ from experiments.closed_loop import simulate
 from experiments.delay_free import delay_free_tables
 from experiments.extended import extended_tables
 from experiments.f_gamma import f_gamma_tables
+from experiments.interpolation_regions import interpolation_tables
 from experiments.loops import design_loop
 from experiments.metrics import last_saturation
+from experiments.physical_limits import limits_tables
 from experiments.pid import pid_tables
+from experiments.robustness import robustness_tables
 from experiments.scenarios import Reference, thesis_reference
-from experiments.tracking import compensators
+from experiments.trade_off import RECOVERIES, SECTORS, trade_off_tables
 from identification.files import CommandGroup, InputError, write_whole
 from identification.frequency_response import read_sweeps
 from identification.model import read_model
@@ -43,14 +47,14 @@ def main() -> None:
 @main.command("simulate")
 @DESIGN
 @click.option("--limit", type=float, required=True, help="Saturation limits +-LIMIT; inf for none.")
-@click.option("--anti-windup", type=click.Choice(["none", "thesis", "corrected"]), required=True)
+@click.option("--anti-windup", required=True, help="none, thesis, corrected, or another of DESIGN.")
 @click.option("--until", type=float, required=True, help="Length of the run in seconds.")
 @click.option("--sample-time", type=float, required=True, help="Distance of the output's rows in seconds.")
 @click.option("--alpha", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
 @click.option("--beta", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
 @click.option("--gamma", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
-@click.option("--amplitude", type=float, help="Of the reference; the thesis's unless given.")
-@click.option("--phase", type=float, help="Of the reference in radians; the thesis's unless given.")
+@click.option("--amplitude", type=float, multiple=True, help="Of the reference; once a frequency; else the thesis's.")
+@click.option("--phase", type=float, multiple=True, help="In radians; once a frequency; the thesis's unless given.")
 @click.option("--offset", type=float, help="Of the reference; the thesis's unless given.")
 @click.option("--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV to write.")
 def simulate_command(
@@ -62,8 +66,8 @@ def simulate_command(
     alpha: float | None,
     beta: float | None,
     gamma: float | None,
-    amplitude: float | None,
-    phase: float | None,
+    amplitude: tuple[float, ...],
+    phase: tuple[float, ...],
     offset: float | None,
     output: Path,
 ) -> None:
@@ -77,11 +81,11 @@ def simulate_command(
         raise InputError(f"{until / sample_time:.3g} rows are asked for; expected at most {MOST_ROWS:.3g}")
     content = read_design(design)
     kind = _compensator(content, anti_windup, {"alpha": alpha, "beta": beta, "gamma": gamma})
-    usual = thesis_reference(content.kind, content.reference_omega)
+    usual = thesis_reference(content.kind, content.reference_omegas)
     reference = Reference(
-        usual.amplitude if amplitude is None else amplitude,
-        usual.omega,
-        usual.phase_rad if phase is None else phase,
+        amplitude or usual.amplitudes,
+        usual.omegas,
+        phase or usual.phases_rad,
         usual.offset if offset is None else offset,
     )
     # the quotient of two decimals may come out a rounding below a whole number
@@ -109,7 +113,7 @@ def _compensator(design: Design, name: str, numbers: Mapping[str, float | None])
         raise InputError(f"--{next(iter(given))} belongs to --anti-windup thesis; found --anti-windup {name}")
     if given:
         return printed_form({**design.anti_windup["thesis"], **given})
-    return compensators(design)[name]
+    return None if name == "none" else design.compensator(name)
 
 
 @main.command("pid")
@@ -125,6 +129,35 @@ def pid(output: Path) -> None:
 def f_gamma(design: Path, output: Path) -> None:
     """The parameter study of f(gamma) for the bound of DESIGN: f_gamma.csv, f_gamma_summary.csv."""
     _write(output, f_gamma_tables(read_design(design).additive_bound))
+
+
+@main.command("trade-off")
+@DESIGN
+@OUTPUT_FOLDER
+def trade_off(design: Path, output: Path) -> None:
+    """f of the corrected anti-windup over recovery time and sector: trade_off.csv, trade_off_summary.csv."""
+    content = read_design(design)
+    with tqdm(total=len(SECTORS) * RECOVERIES, desc="trade-off", disable=None, leave=False) as bar:
+        _write(output, trade_off_tables(content, bar.update))
+
+
+@main.command("interpolation")
+@DESIGN
+@OUTPUT_FOLDER
+def interpolation(design: Path, output: Path) -> None:
+    """Where each design of Q works: interpolation.csv, interpolation_map.csv, interpolation_summary.csv."""
+    _write(output, interpolation_tables(_of_kind(design, "extended")))
+
+
+@main.command("robustness")
+@click.argument("designs", metavar="DESIGN...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@OUTPUT_FOLDER
+def robustness(designs: tuple[Path, ...], output: Path) -> None:
+    """|W_a C S| and the margins of each DESIGN, named by its file: robustness.csv, robustness_summary.csv."""
+    names = [path.stem for path in designs]
+    if len(set(names)) < len(names):
+        raise InputError(f"two of the designs are named {max(names, key=names.count)}; expected different file names")
+    _write(output, robustness_tables({name: read_design(path) for name, path in zip(names, designs, strict=True)}))
 
 
 @main.command("delay-free")
@@ -143,6 +176,17 @@ def delay_free(design: Path, limit: float | None, output: Path) -> None:
 def extended(design: Path, limit: float | None, output: Path) -> None:
     """The chapter 4 loop: extended.csv, extended_summary.csv."""
     _write(output, extended_tables(_of_kind(design, "extended"), _positive(limit)))
+
+
+@main.command("limits")
+@DESIGN
+@click.option("--limit", "limits", type=float, multiple=True, help="Saturation limits +-LIMIT; repeatable.")
+@OUTPUT_FOLDER
+def limits(design: Path, limits: tuple[float, ...], output: Path) -> None:
+    """What no controller of DESIGN's plant can better: limits_KIND.csv, limits_KIND_summary.csv (the first LIMIT)."""
+    content = read_design(design)
+    with tqdm(desc="limits", unit="", disable=None, leave=False) as bar:
+        _write(output, limits_tables(content, limits or None, bar.update))
 
 
 @main.command("additive-error")

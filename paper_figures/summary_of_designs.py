@@ -12,13 +12,26 @@ from design.contract import Design
 from paper_figures.captions import number, of_run, only, required_input
 from paper_figures.summary_of_fit import Table
 
-DESIGNS = {"delay_free": "Chapter 2", "extended": "Chapters 3, 4"}
+DESIGNS = {"delay_free": "Chapter 2", "extended": "Chapters 3, 4", "robust": "Robust redesign"}
 """Where the thesis has each design."""
 
-FIGURES = {"delay_free": "2.12 to 2.14", "extended": "4.1 to 4.4", "f_gamma": "2.10, 2.11"}
+FIGURES = {
+    "delay_free": "2.12 to 2.14",
+    "extended": "4.1 to 4.4",
+    "f_gamma": "2.10, 2.11",
+    "trade_off": "A.1",
+    "interpolation": "A.2",
+    "robustness": "A.3",
+    "limits_delay_free": "A.4",
+    "limits_extended": "A.4",
+}
 """What is drawn of each experiment that needs a design."""
 
-FOLLOWING = {"delay_free": ("delay_free",), "extended": ("f_gamma", "extended")}
+FOLLOWING = {
+    "delay_free": ("delay_free", "limits_delay_free"),
+    "extended": ("f_gamma", "extended", "trade_off", "interpolation", "limits_extended"),
+    "robust": ("robustness",),
+}
 """The experiments that need each design."""
 
 HEAD = (
@@ -59,6 +72,8 @@ def loop_table(designs: Mapping[str, Design], tables: Mapping[str, pd.DataFrame]
 
 def sentences(design: Design, name: str, tables: Mapping[str, pd.DataFrame]) -> str:
     """What a design is and gives; its limits and the parameter study of f if there are tables of them."""
+    if name == "robust":
+        return _redesign(design, tables.get("robustness"))
     if design.hinf:
         said = [
             "For the plant without its dead time",
@@ -82,6 +97,22 @@ def sentences(design: Design, name: str, tables: Mapping[str, pd.DataFrame]) -> 
         omegas = ", ".join(number(omega) for omega in design.reference_omegas)
         said.append(f"The thesis's reference at {omegas} rad/s. {required_input(tables[name])}")
     return ". ".join(said) + "."
+
+
+def _redesign(design: Design, robustness: pd.DataFrame | None) -> str:
+    order = int(design.parameters["roll_off_order"])
+    said = "As the design of chapters 3, 4"
+    if order:
+        said += f", with {order} more poles of T_so at {number(design.parameters['roll_off'])} rad/s"
+    if robustness is None:
+        return f"{said}."
+    before, after = (number(of_run(robustness, f"design_{name}", "peak")) for name in ("extended", "robust"))
+    least, most = (1e3 * of_run(robustness, "design_robust", f"delay_{end}_s") for end in ("least", "greatest"))
+    ends = f"from {number(least)} ms" + ("" if isnan(most) else f" to {number(most)} ms")
+    return (
+        f"{said}: ||W_a C S|| = {after}, where that design has {before}; below 1 every plant within W_a is stable. "
+        f"True dead times {ends}, all else as modelled, leave the loop stable."
+    )
 
 
 def _judgement(facts: Mapping[str, Any] | None) -> tuple[str, str, str]:

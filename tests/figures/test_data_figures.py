@@ -78,7 +78,26 @@ def tracking_tables(name: str) -> Tables:
     return {name: pd.DataFrame(columns), f"{name}_summary": pd.DataFrame(rows)}
 
 
+def limits_tables() -> Tables:
+    tables = {}
+    for kind, limit in (("extended", 8.0), ("delay_free", 4.0)):
+        limits, start_s = np.array([2.0, 4.0, 6.0, 8.0, 10.0]), np.linspace(0.0, 8.0, 17)
+        floor = np.maximum(0.0, 7.0 - limits)
+        rows = {"limit": limits, "required": 7.0, "periodic_lower": floor, "periodic_upper": 1.01 * floor}
+        rows |= {"settling_lower_s": 5 / limits, "settling_upper_s": 5.25 / limits}
+        rest = {"limit": limit, "start_s": start_s, "rest_lower": np.maximum(0.0, 5.0 - 9 * start_s)}
+        rest["rest_upper"] = rest["rest_lower"] + 0.03125
+        for k, run in enumerate(("none", "thesis", "corrected"), start=2):
+            rows[f"peak_{run}"] = 3 * k * np.maximum(1e-7, 7.0 - limits)
+            rows[f"settling_{run}_s"] = (16.5 + k) / limits
+            rows[f"ratio_{run}"] = 3.0 * k
+            rest[f"tail_{run}"] = 5.0 * np.exp(-(start_s**2) / 4 / k)
+        tables |= {f"limits_{kind}": pd.DataFrame(rows), f"limits_{kind}_summary": pd.DataFrame(rest)}
+    return tables
+
+
 TABLES = {
+    "limits_extended": limits_tables,
     "pid": pid_tables,
     "additive_error": additive_error_tables,
     "f_gamma": f_gamma_tables,
@@ -127,7 +146,7 @@ PANELS = {
         signals(signal, run) for run in ("thesis", "corrected") for signal in ("control", "saturated", "control")
     ],
 }
-NAMES = [*PANELS, "fig_2_09", "fig_2_10", "fig_2_11"]
+NAMES = [*PANELS, "fig_2_09", "fig_2_10", "fig_2_11", "fig_a_04"]
 CONTROL_PANELS = [
     *(("fig_2_02", 1, "swapped_none"), ("fig_2_03", 3, "printed_back_calculation")),
     *(("fig_2_13", 0, "thesis"), ("fig_2_13", 1, "corrected"), ("fig_4_04", 2, "thesis"), ("fig_4_04", 5, "corrected")),
@@ -314,6 +333,7 @@ SAID = {
     "fig_4_02": ["limit", "last_saturation_s"],
     "fig_4_03": ["limit", "last_saturation_s", "offset", "settling_s"],
     "fig_4_04": ["limit", "last_saturation_s"],
+    "fig_a_04": ["limit"],
 }
 
 
@@ -325,6 +345,88 @@ def test_caption_says_what_the_summary_says(name, column):
     summary = tables[module.TABLES[1]]
     summary[column] = summary[column] * 1.5
     assert module.caption(tables) != before
+
+
+@pytest.mark.parametrize(
+    ("table", "column"),
+    [
+        *(("limits_extended", f"settling_{name}") for name in ("upper_s", "none_s", "thesis_s", "corrected_s")),
+        *(("limits_delay_free", f"peak_{run}") for run in ("none", "thesis", "corrected")),
+        *(("limits_delay_free", column) for column in ("periodic_lower", "periodic_upper", "required")),
+        ("limits_delay_free_summary", "limit"),
+    ],
+)
+def test_caption_of_the_floor_says_what_the_tables_say(table, column):
+    module, tables = figure_module("fig_a_04"), limits_tables()
+    before = module.caption(tables)
+    tables[table][column] *= 1.5
+    assert module.caption(tables) != before
+
+
+def test_caption_of_the_floor_names_what_never_settles_and_what_diverges():
+    module, tables = figure_module("fig_a_04"), limits_tables()
+    tables["limits_extended"][["settling_upper_s", "settling_none_s"]] = np.nan
+    tables["limits_delay_free"].loc[1, "peak_none"] = np.nan
+    caption = module.caption(tables)
+    assert "never under the best control, never without anti-windup, after 2.44 s with the thesis's one" in caption
+    assert "without anti-windup the loop diverges, with the thesis's one it reaches 27," in caption
+
+
+@pytest.mark.parametrize(
+    ("letter", "table", "along", "floor", "error"),
+    [
+        (0, "limits_extended_summary", "start_s", "rest", "tail"),
+        (1, "limits_delay_free", "limit", "periodic", "peak"),
+    ],
+)
+def test_floor_and_runs_are_drawn_in_the_named_styles(letter, table, along, floor, error):
+    tables = limits_tables()
+    rows = tables[table]
+    panel = lettered(figure_module("fig_a_04").draw(tables))[letter]
+    for run, kind in RUN.items():
+        assert [look(line) for line in lines_of(panel, rows[f"{error}_{run}"])] == [
+            look(Line2D([], [], **style.LINES[kind]))
+        ]
+    (best,) = (
+        line
+        for line in panel.lines
+        if look(line) == look(Line2D([], [], **style.LINES["family 4"])) and len(line.get_xdata())
+    )
+    bottom, top = panel.get_ylim()
+    np.testing.assert_array_equal(best.get_xdata(), rows[along])
+    seen = rows[f"{floor}_upper"] > bottom
+    np.testing.assert_array_equal(best.get_ydata()[seen], rows[f"{floor}_upper"][seen])
+    assert (best.get_ydata()[~seen] < bottom).all()
+    (grey,) = panel.collections
+    edge = {tuple(point) for point in grey.get_paths()[0].vertices}
+    forced = rows[rows[f"{floor}_lower"] > bottom]
+    assert set(zip(forced[along], forced[f"{floor}_lower"], strict=True)) <= edge
+    assert panel.get_yscale() == "log"
+    assert top > rows[f"{error}_none"].max()
+
+
+@pytest.mark.parametrize("row", [0, 4])
+def test_floor_under_one_limit(row, saved):
+    """Below what tracking needs, and above, where the floor is zero."""
+    module, tables = figure_module("fig_a_04"), limits_tables()
+    for kind in ("extended", "delay_free"):
+        tables[f"limits_{kind}"] = tables[f"limits_{kind}"].iloc[[row]]
+    panel = lettered(module.draw(tables))[1]
+    limit, peak = tables["limits_delay_free"][["limit", "peak_corrected"]].iloc[0]
+    assert panel.get_xlim()[0] < limit < panel.get_xlim()[1]
+    assert panel.get_ylim()[0] < peak < panel.get_ylim()[1]
+    saved(module.draw(tables), "fig_a_04", module.caption(tables))
+
+
+@pytest.mark.parametrize("gone", [1e99, np.nan])
+def test_floor_stays_legible_beside_a_run_that_diverges(gone, saved):
+    module, tables = figure_module("fig_a_04"), limits_tables()
+    tables["limits_delay_free"]["peak_none"] = gone
+    tables["limits_extended_summary"]["tail_none"] = gone
+    figure = module.draw(tables)
+    for panel, most in zip(lettered(figure), (5.0, 5.0), strict=True):
+        assert 1e-3 < panel.get_ylim()[0] < most < panel.get_ylim()[1] < 1100.0
+    saved(figure, "fig_a_04", module.caption(tables))
 
 
 @pytest.mark.parametrize("name", ["fig_2_13", "fig_4_01", "fig_4_02", "fig_4_03", "fig_4_04"])
@@ -351,7 +453,7 @@ def test_a_run_that_diverges_is_drawn_as_far_as_it_goes_and_said_to_diverge():
 def test_caption_is_plain_and_names_the_figure_of_the_thesis(name):
     caption = figure_module(name).caption(tables_of(name))
     _, chapter, number = name.split("_")
-    assert f"thesis Fig. {chapter}.{int(number)})" in caption
+    assert chapter == "a" or f"thesis Fig. {chapter}.{int(number)})" in caption
     assert caption.isascii()
     assert "nan" not in caption
     assert not set("{}\n") & set(caption)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from identification.structure import Structure
 from paper_figures import style, summary_page
 from paper_figures.__main__ import main
 from paper_figures.summary import Summary, summarise
+from paper_figures.summary_of_designs import sentences
 from paper_figures.summary_of_fit import parameter_table
 
 NO_INTEGRATOR = "the plant has 0 integrators; the design expects exactly one, Eq. (2.20)"
@@ -233,7 +235,7 @@ def test_refusals_stand_in_their_place_with_what_is_not_drawn():
     results = outcomes() | {"f_gamma": "f-gamma will not"}
     said = summarise(model_of(plant, tests), tests, DESIGNS | {"delay_free": NO_INTEGRATOR}, results)
     assert said.refused == (
-        ("Chapter 2", f"Refused: {NO_INTEGRATOR}. Not drawn: Fig. 2.12 to 2.14."),
+        ("Chapter 2", f"Refused: {NO_INTEGRATOR}. Not drawn: Fig. 2.12 to 2.14, A.4."),
         ("Chapters 3, 4", "Refused: f-gamma will not. Not drawn: Fig. 2.10, 2.11."),
     )
     assert [head for head, _ in said.designs] == ["Chapter 2", "Chapters 3, 4", "Chapters 3, 4"]
@@ -345,7 +347,7 @@ def summary(build: Path) -> Result:
 def test_command_reads_what_was_made_and_refused_and_writes_the_same_bytes_twice(build):
     result = summary(build)
     assert result.exit_code == 0, result.output
-    said = f"Chapter 2: Refused: {NO_INTEGRATOR}. Not drawn: Fig. 2.12 to 2.14."
+    said = f"Chapter 2: Refused: {NO_INTEGRATOR}. Not drawn: Fig. 2.12 to 2.14, A.4."
     assert result.output == f"1 test -> {build / 'summary.pdf'}\n{said}\n"
     assert said in " ".join((build / "summary.txt").read_text(encoding="utf-8").split())
     first = {path.suffix: path.read_bytes() for path in build.glob("summary.*")}
@@ -378,3 +380,21 @@ def test_panels_show_tests_model_and_bound():
     letters = [text.get_text() for panel in (magnitude, phase, figure.axes[1], relative) for text in panel.texts]
     assert letters == ["(a)", "(b)", "(c)", "(d)"]
     assert all(a < b for a, b in pairwise(letters))
+
+
+def test_the_robust_redesign_in_words() -> None:
+    design = replace(design_of("extended"), parameters={"roll_off": 45.5, "roll_off_order": 2})
+    table = pd.DataFrame(
+        {
+            "run": ["design_extended", "design_robust"],
+            "peak": [7.25, 0.875],
+            "delay_least_s": [0.0, 0.0015],
+            "delay_greatest_s": [0.155, 0.144],
+        }
+    )
+    said = sentences(design, "robust", {"robustness": table})
+    for part in ("2 more poles of T_so at 45.5 rad/s", "= 0.875, where that design has 7.25", "1.5 ms to 144 ms"):
+        assert part in said
+    assert sentences(design, "robust", {}).endswith("45.5 rad/s.")
+    as_it_is = replace(design, parameters={"roll_off_order": 0})
+    assert sentences(as_it_is, "robust", {}) == "As the design of chapters 3, 4."

@@ -22,7 +22,10 @@ if [ -e "$here/$command.crashes" ]; then echo "Traceback of $command" >&2; exit 
 echo "$*" >> "$here/log"
 case $room in
 identification | design) touch "$output" ;;
-experiments) name=${command//-/_}; touch "$output/$name.csv" "$output/${name}_summary.csv" ;;
+experiments) name=${command//-/_}
+    [ $command != limits ] || name=limits_$(basename "$4" .json | sed s/design_//)
+    [ $command != interpolation ] || touch "$output/interpolation_map.csv"
+    touch "$output/$name.csv" "$output/${name}_summary.csv" ;;
 paper_figures) [ $command = summary ] && stem=$output/summary || stem=$output/$command
     touch "$stem.pdf" "$stem.svg" "$stem.png" "$stem.txt" ;;
 esac
@@ -82,11 +85,15 @@ def test_a_refused_design_takes_only_what_hangs_on_it(make: Make, tmp_path: Path
     assert "***" not in refused.stdout + refused.stderr
     gone = everything - built(tmp_path)
     assert gone == {
-        *("design_extended.json", "results/extended.csv", "results/extended_summary.csv"),
-        *("results/f_gamma.csv", "results/f_gamma_summary.csv"),
+        *("design_extended.json", "design_robust.json", "results/interpolation_map.csv"),
+        *(
+            f"results/{name}{part}.csv"
+            for name in ("extended", "f_gamma", "trade_off", "interpolation", "robustness", "limits_extended")
+            for part in ("", "_summary")
+        ),
         *(
             f"figures/fig_{n}.{kind}"
-            for n in ("2_10", "2_11", "4_01", "4_02", "4_03", "4_04")
+            for n in ("2_10", "2_11", "4_01", "4_02", "4_03", "4_04", "a_01", "a_02", "a_03", "a_04")
             for kind in ("pdf", "txt")
         ),
     }

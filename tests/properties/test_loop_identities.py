@@ -9,11 +9,13 @@ from hypothesis import strategies as st
 
 from design.anti_windup import AntiWindup, second_order
 from design.contract import Design
+from design.extended import design_extended
 from experiments.closed_loop import simulate
 from experiments.loops import design_loop
 from experiments.metrics import last_saturation
 from experiments.pade import with_pade
-from experiments.scenarios import sinusoid, thesis_reference
+from experiments.scenarios import Reference, sinusoid, thesis_reference
+from identification.model import IdentifiedModel
 
 LIMITS = st.floats(8.0, 40.0)
 FREE = (-np.inf, np.inf)
@@ -124,3 +126,21 @@ def test_chapter_two_hides_the_plants_integrator(delay_free_design: Design) -> N
     s = np.array([1e-6, 1e-7])
     P_S = P(s) / (1 + P(s) * C(s))
     assert abs(P_S[1] / P_S[0]) == pytest.approx(10.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("omegas", [[0.0], [0.8, 2.5], [0.0, 1.5]])
+@pytest.mark.parametrize("level", [None, 0.9])
+def test_every_frequency_of_the_reference_is_followed(
+    implied: IdentifiedModel, omegas: list[float], level: float | None
+) -> None:
+    """One interpolation condition each: from rest and with saturation on the way the error dies out."""
+    pairs = [(2.0, 1.0)] * sum(omega > 0 for omega in omegas)
+    design = design_extended(implied, omegas, 4.0, pairs, robust_level=level)
+    n = len(omegas)
+    reference = Reference((20.0,) * n, tuple(omegas), (1.0,) * n, 0.0)
+    loop = design_loop(design, reference, design.compensator("corrected"))
+    run = simulate(loop, (-15.0, 15.0), np.linspace(0, 40, 4001))
+    assert len(run.events_s) > 0
+    error = run.outputs["error"]
+    assert np.abs(error[run.time_s > 35]).max() < 1e-6
+    assert abs(error[0]) > 10

@@ -11,18 +11,25 @@ from pytest_regressions.file_regression import FileRegressionFixture
 from strict import Strict
 
 from design.contract import Design
+from design.extended import design_extended
 from experiments.additive_error import additive_error_tables
 from experiments.delay_free import delay_free_tables
 from experiments.extended import extended_tables
 from experiments.f_gamma import f_gamma_tables
+from experiments.interpolation_regions import interpolation_tables
 from experiments.pid import pid_tables
+from experiments.robustness import robustness_tables
+from experiments.trade_off import trade_off_tables
 from identification.frequency_response import read_sweeps
 from identification.model import read_model
 from identification.thesis import DATA
 from paper_figures.__main__ import figure_module, figure_names
 
-EXPERIMENTS = ("pid", "additive_error", "f_gamma", "delay_free", "extended")
+EXPERIMENTS = ("pid", "additive_error", "f_gamma", "delay_free", "extended", "trade_off", "interpolation", "robustness")
+TABLES = [*(f"{name}{part}" for name in EXPERIMENTS for part in ("", "_summary")), "interpolation_map"]
 MOST_ROWS = 120
+# The ends of their intervals are as exact as the intervals are narrow; tests/unit/test_physical_limits.py holds them.
+ENCLOSED = {f"limits_{kind}{part}" for kind in ("delay_free", "extended") for part in ("", "_summary")}
 
 
 @cache
@@ -33,12 +40,17 @@ def sweeps() -> tuple[object, ...]:
 @pytest.fixture(scope="module")
 def tables(extended_design: Design, delay_free_design: Design) -> dict[str, pd.DataFrame]:
     implied = read_model("implied")
+    chosen = extended_design.parameters
+    robust = design_extended(implied, extended_design.reference_omegas, chosen["a"], chosen["pairs"], robust_level=0.9)
     return (
         pid_tables()
         | additive_error_tables(implied, sweeps())  # type: ignore[arg-type]
         | f_gamma_tables(implied.additive_bound)
         | delay_free_tables(delay_free_design)
         | extended_tables(extended_design)
+        | trade_off_tables(extended_design)
+        | interpolation_tables(extended_design)
+        | robustness_tables({"design_extended": extended_design, "design_robust": robust})
     )
 
 
@@ -48,6 +60,8 @@ def columns_of(table: pd.DataFrame) -> dict[str, np.ndarray]:
         wide = table.set_index("run").stack(future_stack=True)
         table = pd.DataFrame({f"{run}.{column}": [float(value)] for (run, column), value in wide.items()})
     kept = table.iloc[:: max(1, len(table) // MOST_ROWS)]
+    if "method" in kept:
+        kept = kept.assign(method=pd.factorize(kept["method"], sort=True)[0])
     columns: dict[str, np.ndarray] = {}
     for name in kept:
         values = kept[name].to_numpy(dtype=float)
@@ -58,14 +72,14 @@ def columns_of(table: pd.DataFrame) -> dict[str, np.ndarray]:
     return columns
 
 
-@pytest.mark.parametrize("name", [f"{name}{part}" for name in EXPERIMENTS for part in ("", "_summary")])
+@pytest.mark.parametrize("name", TABLES)
 def test_table(name: str, tables: dict[str, pd.DataFrame], strict_snapshot: Strict) -> None:
     strict_snapshot(name, columns_of(tables[name]))
 
 
 @pytest.mark.parametrize("name", figure_names())
 def test_every_figure_draws_from_tables_that_are_kept(name: str, tables: dict[str, pd.DataFrame]) -> None:
-    assert set(figure_module(name).TABLES) <= set(tables)
+    assert set(figure_module(name).TABLES) <= set(tables) | ENCLOSED
 
 
 @pytest.mark.parametrize("name", [name for name in figure_names() if not figure_module(name).TABLES])

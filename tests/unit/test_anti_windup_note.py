@@ -14,12 +14,13 @@ from hypothesis import strategies as st
 from design.anti_windup import from_one_plus, second_order
 from design.block import Block, plant_block
 from design.contract import Design
+from design.corrected import corrected
 from design.extended import design_extended
 from design.judgement import judge, lasting_offset
 from design.popov import popov_sector
 from experiments.closed_loop import simulate
 from experiments.loops import design_loop
-from experiments.scenarios import sinusoid
+from experiments.scenarios import sinusoid, thesis_reference
 from identification.model import IdentifiedModel
 from identification.plant import Mode, PlantModel
 
@@ -134,3 +135,17 @@ def test_the_uncertainty_enters_through_the_loop(extended_design: Design) -> Non
         assert u == pytest.approx(-(theta - C * S_Delta * Delta * M), rel=1e-8)
         assert v == pytest.approx(C * S_Delta * Delta * M, rel=1e-8, abs=1e-12)
         assert y + y_d == pytest.approx((P + Delta) * v - Delta * M, rel=1e-7, abs=1e-9)
+
+
+def test_a_slow_recovery_centres_the_error_where_the_limits_are_too_small(delay_free_design: Design) -> None:
+    """Chapter 2 under +-10, where 11.05 is needed and no control stays below a peak of 1.394."""
+    reference = thesis_reference("delay-free", delay_free_design.reference_omegas)
+    time_s = np.linspace(0.0, 48.0, 9601)
+    peaks = []
+    for recovery_s in (0.3, 3.0, 30.0):
+        kind = corrected((0j,), delay_free_design.additive_bound, recovery_s, 0.95, 960.0).anti_windup
+        error = simulate(design_loop(delay_free_design, reference, kind), (-10.0, 10.0), time_s).outputs["error"]
+        peaks.append(np.abs(error[time_s > 44]).max())
+    assert peaks[0] > peaks[1] > peaks[2] > 1.394
+    assert peaks[2] < 1.15 * 1.394
+    assert peaks[0] == pytest.approx(2 * 1.394, rel=0.01)

@@ -88,7 +88,11 @@ def test_design_refuses_bad_plants(runner: CliRunner, tmp_path: Path, member: st
         (["delay-free", "implied", "--period", "-4"], "period"),
         (["delay-free", "implied", "--period", "nan"], "period"),
         (["delay-free", "implied", "--period", "4", "--epsilon", "99"], "epsilon"),
-        (["extended", "implied", "--reference-omega", "0", "--a", "4", "--e", "2", "--f", "1"], "omega"),
+        (["extended", "implied", "--reference-omega", "0", "--a", "4", "--e", "2", "--f", "1"], "0 frequencies above"),
+        (["extended", "implied", "--reference-omega", "-1", "--a", "4", "--e", "2", "--f", "1"], "omega >= 0"),
+        (["extended", "implied", "--reference-omega", "1.5", "--a", "4", "--e", "2"], "--f 0 times"),
+        (["delay-free", "implied", "--period", "4", "--sector", "1"], "0 < sector < 1"),
+        (["delay-free", "implied", "--period", "4", "--bandwidth", "0.1"], "bandwidth of the anti-windup"),
         (["extended", "implied", "--reference-omega", "1.5", "--a", "4", "--e", "-2", "--f", "1"], "unstable"),
         (
             [

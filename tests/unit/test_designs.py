@@ -278,6 +278,14 @@ def test_the_redesign_is_robust_and_tracks(implied: IdentifiedModel, level: floa
     assert complex(T_so(1.5j)) == pytest.approx(np.exp(1.5j * implied.plant.delay_s), rel=1e-9)
 
 
+def test_a_design_that_meets_the_level_stays_as_it_is(table: IdentifiedModel) -> None:
+    """With Table 2.1 as printed (zeta = 0.08 at 175 rad/s) |W_a C S| is 0.896."""
+    design = design_extended(table, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9)
+    assert design.parameters["roll_off_order"] == 0
+    plain = design_extended(table, [1.5], 4.0, [(2.0, 1.0)]).blocks["T_so"]
+    np.testing.assert_allclose(design.blocks["T_so"](S), plain(S), rtol=1e-9)
+
+
 def test_a_bound_that_forbids_tracking_is_refused(implied: IdentifiedModel) -> None:
     """|W_a C S| = |W_a/P| where the loop follows: no controller can help."""
     large = AdditiveBound.printed_form(5.0, 20.0, 280.0, 0.01)

@@ -1,0 +1,300 @@
+"""The smallest peak error that any controller, causal or not, can reach under a limited input, and what loops reach."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+
+from design.block import plant_block
+from design.contract import Design
+from design.realization import realize
+from experiments.linear_programs import REFINED, SPARE, Interval, PeakProgram
+from experiments.metrics import settling_time
+from experiments.scenarios import Reference, thesis_reference
+from experiments.tracking import SETTLED, loops, run_all
+from identification.files import InputError
+from identification.plant import PlantModel
+from identification.thesis import printed
+
+PERIODIC_STEPS = 400  # of a period
+STEPS = 200  # of a period from rest, for E(t0)
+FEWER_STEPS = 100  # of a period from rest, for the settling time alone
+HORIZON = 3  # periods from rest
+STARTS = 20  # most programs that trace E(t0)
+FALL = 1.1  # E(t0) is traced further where it may fall by more than this
+EVENLY = 16  # other t0 in a period
+MULTIPLES = (0.8, 0.9, 0.95, 0.98, 1.05, 1.2, 1.5)  # of the control that perfect tracking needs
+USUAL_MULTIPLE = 1.2
+RUN_PERIODS = 12
+SAMPLES_PER_PERIOD = 2000
+
+NEVER = Interval(math.nan, math.nan)
+
+Tick = Callable[[], object]
+
+
+def periodic_limit(plant: PlantModel, reference: Reference, limit: float) -> Interval:
+    """Enclose the least peak of |r - y| over all periodic u with |u| <= limit.
+
+    Parameters
+    ----------
+    plant
+        With at least one pole more than zeros. Its dead time only shifts u.
+    reference
+        Periodic: its frequencies, 0 apart, are multiples of the slowest one, whose period u has.
+    limit
+        Of the actuator, in its unit, positive and finite.
+
+    Returns
+    -------
+    Interval
+        In the unit of the output, see :meth:`experiments.linear_programs.PeakProgram.solve`.
+
+    Raises
+    ------
+    InputError
+        An argument is not as above, or a pole is too fast for the period.
+
+    Notes
+    -----
+    No u, periodic or not, keeps |r - y| below the lower end for ever: if one did, so would the mean of its
+    shifts by whole periods, which is periodic. For K/s and r of amplitude a, with rho = limit/(a omega/K) <= 1,
+    the least peak is a (sqrt(1 - rho^2) - rho arccos(rho)): of a bounded slope, y is at its nearest to r half the
+    greatest excess of |r(t1) - r(t2)| over the way K limit |t1 - t2| away.
+    """
+    _check(plant, reference, limit)
+    constant = 0.0
+    if not plant.integrators:
+        still = zip(reference.amplitudes, reference.omegas, reference.phases_rad, strict=True)
+        constant = reference.offset + sum(a * math.sin(phase) for a, omega, phase in still if omega == 0)
+    if reference.required(plant) + abs(constant / plant.gain) <= limit:
+        return Interval(0.0, 0.0)
+    program = _program(plant, reference.period_s, PERIODIC_STEPS, periodic=True)
+    return program.solve(reference(program.time_s), limit)
+
+
+@dataclass(frozen=True)
+class RestLimit:
+    """E(t0): from rest at t = 0, u = 0 before, the least greatest |r(t) - y(t)| for t0 <= t <= horizon_s.
+
+    Parameters
+    ----------
+    plant, reference, limit
+        As in :func:`periodic_limit`.
+    steps
+        In a period.
+    tick
+        Called after every program.
+
+    Raises
+    ------
+    InputError
+        An argument is not as :func:`periodic_limit` wants it.
+
+    Notes
+    -----
+    Until the dead time is over the error is |r|, whatever u does; from then on it is that of the plant without
+    dead time against the reference ahead. E falls with t0, so that every lower bound holds for all earlier t0 and
+    every upper bound for all later ones.
+    """
+
+    plant: PlantModel
+    reference: Reference
+    limit: float
+    steps: int = STEPS
+    tick: Tick = lambda: None
+    _solved: dict[int, Interval] = field(default_factory=dict, init=False)
+
+    def __post_init__(self) -> None:
+        _check(self.plant, self.reference, self.limit)
+
+    @property
+    def horizon_s(self) -> float:
+        """When the error ceases to count: three periods after the dead time."""
+        return self.plant.delay_s + HORIZON * self.reference.period_s
+
+    @property
+    def last(self) -> int:
+        """Index of the latest t0: a period before the horizon."""
+        return (HORIZON - 1) * self.steps * REFINED
+
+    def start_s(self, index: int) -> float:
+        """The t0 with an index, in seconds: 0 for -1, the dead time for 0, and from there on in equal parts."""
+        if index < 0:
+            return 0.0
+        return self.plant.delay_s + index * self._program.part * self._program.cell_s
+
+    def at(self, index: int) -> Interval:
+        """Enclose E(t0) for one t0."""
+        if index < 0:
+            time_s = np.linspace(0.0, self.plant.delay_s, 1001)
+            known = float(np.abs(self.reference(time_s)).max())
+            between = self.reference.amplitude * (max(self.reference.omegas) * time_s[1]) ** 2 / 8
+            later = self.at(0)
+            return Interval(max(known, later.lower), max(known + between, later.upper))
+        if index not in self._solved:
+            program = self._program
+            ahead = self.reference(program.time_s + self.plant.delay_s)
+            self._solved[index] = program.solve(ahead, self.limit, index * program.part)
+            self.tick()
+        return self._known(index)
+
+    def _known(self, index: int) -> Interval:
+        """What the programs solved so far say of E(t0)."""
+        lower = max(found.lower for other, found in self._solved.items() if other >= index)
+        upper = min(found.upper for other, found in self._solved.items() if other <= index)
+        return Interval(lower, upper)
+
+    def table(self) -> pd.DataFrame:
+        """E(t0) as columns start_s, rest_lower, rest_upper: up to 20 programs where it falls most, and even steps."""
+        floor = SETTLED * self.reference.amplitude
+
+        def fall(pair: tuple[int, int]) -> float:
+            high, low = self.at(pair[0]).upper, self.at(pair[1]).lower
+            return max(high, floor) / max(low, floor) if pair[1] - pair[0] > 1 else 1.0
+
+        chosen = [0, self.last]
+        while len(chosen) < STARTS and fall(widest := max(pairwise(chosen), key=fall)) > FALL:
+            chosen = sorted([*chosen, sum(widest) // 2])
+        starts = sorted({*chosen, *range(0, self.last, self.steps * REFINED // EVENLY)})
+        found = [self._known(index) for index in starts]
+        if self.plant.delay_s:
+            starts, found = [-1, *starts], [self.at(-1), *found]
+        return pd.DataFrame(
+            {
+                "start_s": [self.start_s(index) for index in starts],
+                "rest_lower": [interval.lower for interval in found],
+                "rest_upper": [interval.upper for interval in found],
+            }
+        )
+
+    def settling(self, band: float) -> Interval:
+        """Enclose, in seconds, the first t0 from which on |r - y| can stay within ``band``; NaN where there is none.
+
+        Parameters
+        ----------
+        band
+            In the unit of the output, positive.
+        """
+        if not band > 0:
+            raise InputError(f"the band is {band:g}; expected a positive number")
+        return Interval(self._first(lambda e: e.lower <= band)[0], self._first(lambda e: e.upper <= band)[1])
+
+    def _first(self, inside: Callable[[Interval], bool]) -> tuple[float, float]:
+        """Two neighbouring t0 between which a statement that stays true as E falls becomes so; NaN if it never does."""
+        if inside(self.at(-1)):
+            return 0.0, 0.0
+        if not inside(self.at(self.last)):
+            return math.nan, math.nan
+        outside, found = -1, self.last
+        while found - outside > 1:
+            middle = (outside + found) // 2
+            if inside(self.at(middle)):
+                found = middle
+            else:
+                outside = middle
+        return self.start_s(outside), self.start_s(found)
+
+    @cached_property
+    def _program(self) -> PeakProgram:
+        steps = HORIZON * self.steps + SPARE
+        return _program(self.plant, self.reference.period_s * steps / self.steps, steps, periodic=False)
+
+
+def limits_tables(
+    design: Design, limits: Sequence[float] | None = None, tick: Tick = lambda: None
+) -> dict[str, pd.DataFrame]:
+    """What the runs without and with anti-windup leave to gain, under several limits.
+
+    Parameters
+    ----------
+    design
+        Of either kind.
+    limits
+        Of the actuator, +-limit each. Unless given, 0.8 to 1.5 times the amplitude that perfect tracking needs,
+        and, if the thesis prints a limit, that.
+    tick
+        Called after every program and after every set of runs.
+
+    Returns
+    -------
+    dict
+        ``limits_KIND``, a row for each limit, ascending: limit, required, periodic_lower, periodic_upper;
+        settling_lower_s, settling_upper_s (from rest, the first time after which the error can stay within 1 % of
+        the reference's amplitude); and for every run NAME peak_NAME (greatest |error| over the last of twelve
+        periods), settling_NAME_s (to the same band), ratio_NAME (peak_NAME over periodic_lower). Cells are empty
+        for what never settles, diverges, or would be divided by zero.
+        ``limits_KIND_summary`` for one limit, the first given or else the printed one: limit, start_s,
+        rest_lower, rest_upper (see :class:`RestLimit`) and tail_NAME, the greatest |error| of the run from start_s
+        to the horizon of three periods.
+
+    Raises
+    ------
+    InputError
+        A limit is not positive and finite, or see :func:`periodic_limit`.
+    """
+    reference = thesis_reference(design.kind, design.reference_omegas)
+    plant, name = design.loop_plant, design.kind.replace("-", "_")
+    required = reference.required(plant)
+    if not limits:
+        usual = printed()[name].get("limit", USUAL_MULTIPLE * required)
+        limits = [usual, *(multiple * required for multiple in MULTIPLES)]
+    for limit in limits:
+        _check(plant, reference, limit)
+    rest = RestLimit(plant, reference, limits[0], tick=tick)
+    summary = rest.table().assign(limit=limits[0])
+    evenly = np.linspace(0.0, RUN_PERIODS * reference.period_s, RUN_PERIODS * SAMPLES_PER_PERIOD + 1)
+    time_s, every, rows = np.union1d(evenly, summary["start_s"]), loops(design, reference), []
+    for limit in sorted(set(limits)):
+        runs = run_all(every, limit, time_s)
+        tick()
+        errors = {run: np.abs(result.outputs["error"]) for run, result in runs.items()}
+        rows.append({"limit": limit, "required": required} | _row(plant, reference, limit, time_s, errors, tick))
+        if limit == limits[0]:
+            counted = time_s <= rest.horizon_s
+            for run, error in errors.items():
+                tails = np.maximum.accumulate(error[counted][::-1])[::-1]
+                summary[f"tail_{run}"] = tails[np.searchsorted(time_s, summary["start_s"])]
+    return {f"limits_{name}": pd.DataFrame(rows), f"limits_{name}_summary": summary}
+
+
+def _row(
+    plant: PlantModel,
+    reference: Reference,
+    limit: float,
+    time_s: np.ndarray,
+    errors: Mapping[str, np.ndarray],
+    tick: Tick,
+) -> dict[str, float]:
+    band, periodic, settled = SETTLED * reference.amplitude, periodic_limit(plant, reference, limit), NEVER
+    tick()
+    if periodic.lower <= band:
+        settled = RestLimit(plant, reference, limit, FEWER_STEPS, tick).settling(band)
+    row = {"periodic_lower": periodic.lower, "periodic_upper": periodic.upper}
+    row |= {"settling_lower_s": settled.lower, "settling_upper_s": settled.upper}
+    for run, error in errors.items():
+        row[f"peak_{run}"] = peak = float(error[time_s >= time_s[-1] - reference.period_s].max())
+        row[f"settling_{run}_s"] = settling_time(time_s, error, band) if peak <= band else math.nan
+        row[f"ratio_{run}"] = peak / periodic.lower if periodic.lower > 0 else math.nan
+    return row
+
+
+def _program(plant: PlantModel, span_s: float, steps: int, *, periodic: bool) -> PeakProgram:
+    return PeakProgram(realize(plant_block(plant.without_delay())), span_s, steps, periodic, plant.integrators > 0)
+
+
+def _check(plant: PlantModel, reference: Reference, limit: float) -> None:
+    if plant.relative_degree < 1:
+        raise InputError("the plant has as many zeros as poles; expected more poles, or its output may jump")
+    slowest = 2 * math.pi / reference.period_s
+    if not slowest or any(abs(omega / slowest - round(omega / slowest)) > 1e-6 for omega in reference.omegas):
+        said = ", ".join(f"{omega:.6g}" for omega in reference.omegas)
+        raise InputError(f"the reference has the frequencies {said} rad/s; expected multiples of a slowest one above 0")
+    if not (math.isfinite(limit) and limit > 0):
+        raise InputError(f"the limit is {limit:g}; expected a positive finite number")

@@ -1,0 +1,398 @@
+"""The floor of the peak error: closed forms, laws, certificates by other means, and no run below it."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+from held_plant import PLANTS, held_response
+
+from design.block import plant_block
+from design.contract import Design
+from design.realization import realize
+from experiments import physical_limits
+from experiments.__main__ import main
+from experiments.cells import Cells
+from experiments.linear_programs import Interval, PeakProgram
+from experiments.physical_limits import RestLimit, limits_tables, periodic_limit
+from experiments.scenarios import Reference, sinusoid
+from identification.files import InputError
+from identification.plant import Mode, PlantModel
+
+CHAPTER_2 = sinusoid(50.0, math.pi / 2, math.pi / 2, -50.0)
+CHAPTER_4 = sinusoid(50.0, 1.5, math.pi / 2, 0.0)
+RESONANT = PlantModel(3.0, (Mode(30.0, 0.05),), (Mode(45.0, 0.02),), 0.03)
+
+
+def integrator(gain: float, delay_s: float = 0.0) -> PlantModel:
+    return PlantModel(gain, (), (), delay_s)
+
+
+def floor_of_integrator(gain: float, reference: Reference, limit: float) -> float:
+    """a (sqrt(1 - rho^2) - rho arccos(rho))."""
+    rho = abs(gain) * limit / (reference.amplitude * reference.omegas[0])
+    return reference.amplitude * (math.sqrt(1 - rho**2) - rho * math.acos(rho))
+
+
+def floor_of_slopes(
+    reference: Reference, slope: float, start_s: float, end_s: float, leaves_zero_s: float = -math.inf
+) -> float:
+    """From start_s to end_s, the distance of r from what has at most a slope, and is 0 until a time: brute force."""
+    time_s = np.linspace(start_s, end_s, 2001)
+    r = reference(time_s)
+    between = np.abs(r[:, None] - r) - slope * np.abs(time_s[:, None] - time_s)
+    away = np.abs(r) - slope * np.maximum(0.0, time_s - leaves_zero_s)
+    return max(0.0, float(between.max()) / 2, float(away.max()))
+
+
+def holds(interval: Interval, value: float, width: float) -> None:
+    """The value is inside, and the interval no wider than that."""
+    assert interval.lower - 1e-9 <= value <= interval.upper + 1e-9
+    assert interval.upper - interval.lower < width
+
+
+@pytest.mark.parametrize(
+    ("gain", "reference", "limit", "known"),
+    [
+        (7.105, CHAPTER_2, 10.0, 1.395),
+        (7.105, CHAPTER_4, 10.0, 0.571),
+        (-0.3, sinusoid(-2.0, 11.0, 0.4, 30.0), 40.0, None),
+        (40.0, sinusoid(1.0, 0.01, -2.0, 1.0), 1e-4, None),
+    ],
+)
+def test_periodic_floor_of_an_integrator(gain: float, reference: Reference, limit: float, known: float | None) -> None:
+    exact = floor_of_integrator(gain, reference, limit)
+    assert known is None or exact == pytest.approx(known, abs=1e-3)
+    holds(periodic_limit(integrator(gain), reference, limit), exact, 3e-4 * reference.amplitude)
+
+
+def test_several_harmonics_and_a_constant() -> None:
+    reference = Reference((3.0, 1.0, 7.0), (2.0, 6.0, 0.0), (0.3, 1.1, 0.5), -4.0)
+    exact = floor_of_slopes(reference, 2.0 * 2.5, 0.0, 1.5 * math.pi)
+    assert exact > 0.1
+    found = periodic_limit(integrator(2.0), reference, 2.5)
+    assert found.lower - 1e-5 <= exact <= found.upper + 1e-9  # the brute force looks every 2 ms
+    assert found.upper - found.lower < 0.001
+
+
+def test_stable_plant_must_hold_the_constant_too() -> None:
+    """A lag far faster than r: y = K u, and the peak of |r| is out of reach by what K L lacks of it."""
+    lag = PlantModel(2.0, (), (), 0.0, 0, (), (400.0,))
+    reference = sinusoid(3.0, 1.0, 0.0, -2.0)
+    interval = periodic_limit(lag, reference, 2.0)
+    assert 0.999 < interval.lower <= 1.0 + 1e-9
+    assert 1.0 <= interval.upper < 1.01
+    assert periodic_limit(lag, reference, 2.51) == Interval(0.0, 0.0)
+    assert periodic_limit(lag, reference, 2.49).lower > 0
+
+
+def test_double_integrator_needs_the_acceleration() -> None:
+    """By a u of one harmonic and its third, dense over amplitude and phase, it does no better, and not much worse."""
+    plant, reference = PlantModel(2.0, (), (), 0.0, 2), sinusoid(5.0, 3.0, 0.7, 8.0)
+    required = reference.required(plant)
+    assert required == pytest.approx(5.0 * 9.0 / 2.0)
+    interval = periodic_limit(plant, reference, 0.9 * required)
+    time_s = np.linspace(0, 2 * math.pi / 3, 401)
+    wave, third = (np.sin(k * (3 * time_s + 0.7)) for k in (1, 3))
+    best = math.inf
+    for share in np.linspace(0.9, 1.1, 41):
+        for other in np.linspace(-0.1, 0.3, 81):
+            if np.abs(share * wave + other * third).max() <= 0.9:
+                best = min(best, 5.0 * np.abs((1 - share) * wave - other / 9 * third).max())
+    assert interval.lower <= best
+    assert interval.upper <= 1.001 * best
+    assert interval.upper - interval.lower < 0.01 * interval.upper
+
+
+@pytest.mark.parametrize("plant", [integrator(7.105, 0.3), RESONANT])
+def test_nothing_is_out_of_reach_from_the_required_amplitude_on(plant: PlantModel) -> None:
+    required = CHAPTER_4.required(plant)
+    assert periodic_limit(plant, CHAPTER_4, required * (1 + 1e-12)) == Interval(0.0, 0.0)
+    assert periodic_limit(plant, CHAPTER_4, 0.97 * required).lower > 0
+
+
+def test_floor_scales_with_amplitude_and_limit_together_and_ignores_dead_time_offset_and_sign() -> None:
+    limit = 0.93 * CHAPTER_4.required(RESONANT)
+    one = periodic_limit(RESONANT, CHAPTER_4, limit)
+    large = periodic_limit(RESONANT, sinusoid(7.3 * 50.0, 1.5, math.pi / 2, 0.0), 7.3 * limit)
+    assert (large.lower, large.upper) == pytest.approx((7.3 * one.lower, 7.3 * one.upper), rel=1e-4)
+    weak = PlantModel(-RESONANT.gain / 4, RESONANT.zero_modes, RESONANT.pole_modes, 0.0)
+    for other in (
+        periodic_limit(weak, CHAPTER_4, 4 * limit),
+        periodic_limit(RESONANT, sinusoid(50.0, 1.5, -0.4, 17.0), limit),
+    ):
+        assert other.lower <= one.upper
+        assert one.lower <= other.upper
+        assert (other.lower, other.upper) == pytest.approx((one.lower, one.upper), rel=5e-3)
+
+
+def test_interval_of_a_resonant_plant_is_narrow_and_falls_with_the_limit() -> None:
+    required = CHAPTER_4.required(RESONANT)
+    found = [periodic_limit(RESONANT, CHAPTER_4, share * required) for share in (0.7, 0.8, 0.9, 0.97)]
+    for interval in found:
+        assert 0 < interval.lower <= interval.upper
+        assert interval.upper - interval.lower < max(0.01 * interval.upper, 2e-4 * 50.0)
+    for weak, strong in pairwise(found):
+        assert strong.upper < weak.lower
+
+
+def test_resonance_much_faster_than_a_step() -> None:
+    plant = PlantModel(7.105, (), (Mode(6e3, 0.01),), 0.0)
+    exact = floor_of_integrator(7.105, CHAPTER_4, 10.0)
+    interval = periodic_limit(plant, CHAPTER_4, 10.0)
+    assert interval.lower == pytest.approx(exact, rel=0.01)
+    assert interval.upper == pytest.approx(exact, rel=0.01)
+    assert interval.lower <= interval.upper
+
+
+def response_to_impulse(plant: PlantModel, time_s: np.ndarray, period_s: float | None) -> np.ndarray:
+    """g, 0 before t = 0, by residues; periodic, where 1/s is a sawtooth of mean zero, for t within (0, period)."""
+    block = plant_block(plant.without_delay())
+    total = np.zeros(len(time_s), dtype=complex)
+    for pole in block.poles:
+        others = [other for other in block.poles if other != pole]
+        residue = block.gain * np.prod([pole - z for z in block.zeros]) / np.prod([pole - p for p in others])
+        if period_s is None:
+            total += residue * np.exp(pole * np.maximum(time_s, 0.0)) * (time_s > 0)
+        elif pole == 0:
+            total += residue * (0.5 - (time_s % period_s) / period_s)
+        else:
+            total += residue * np.exp(pole * (time_s % period_s)) / (1 - np.exp(pole * period_s))
+    return np.real(total)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_certificate_by_another_quadrature(periodic: bool) -> None:
+    """Midpoints twenty times as fine, g by residues: the certificate is no larger, and hardly smaller."""
+    period = 2 * math.pi / 1.5
+    program = PeakProgram(realize(plant_block(RESONANT.without_delay())), period, 100, periodic, True)
+    r, gain, first = CHAPTER_4(program.time_s) / 50.0, 0.93 * CHAPTER_4.required(RESONANT) / 50.0, 0
+    if not periodic:
+        first = 8 * program.part
+    _, mu = program._optimum(r, gain, first)
+    if not periodic:
+        mu[program.counted :] = 0.0
+    mu /= np.abs(mu).sum()
+    assert not mu[:first].any()
+    time_s = (np.arange(20 * program.fineness * 100) + 0.5) * program.cell_s / 20
+    h = np.zeros(len(time_s))
+    for weight, at in zip(mu[mu != 0], program.time_s[mu != 0], strict=True):
+        h += weight * response_to_impulse(RESONANT, at - time_s, period if periodic else None)
+    if periodic:
+        assert abs(mu.sum()) < 1e-9
+        h -= np.median(h)
+    exact = float(mu @ r - gain * np.abs(h).sum() * program.cell_s / 20)
+    claimed = program._certificate(r, gain, mu)
+    assert exact - 0.02 < claimed <= exact + 1e-6
+    if not periodic:
+        mu[program.counted :] = 0.3
+        assert program._certificate(r, gain, mu) == claimed  # the end of the span does not count
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_adjoint_of_the_plant_by_residues(periodic: bool) -> None:
+    """At both ends of a cell from within, and in the mean over it; the weights in the middle make g jump there."""
+    cells = Cells(realize(plant_block(RESONANT.without_delay())), 0.02, 50, periodic, periodic)
+    mu = np.zeros(50 + (not periodic))
+    mu[[3, 20, 21, 45]] = 0.2, -0.5, 0.7, -0.4
+    period = 1.0 if periodic else None
+
+    def expected(time_s: np.ndarray) -> np.ndarray:
+        parts = (mu[j] * response_to_impulse(RESONANT, 0.02 * j - time_s, period) for j in np.flatnonzero(mu))
+        return np.sum(list(parts), axis=0)
+
+    begin = 0.02 * np.arange(50)
+    left, right = cells.correlation(mu)
+    np.testing.assert_allclose(left, expected(begin + 1e-10), atol=1e-6)
+    np.testing.assert_allclose(right, expected(begin + 0.02 - 1e-10), atol=1e-6)
+    inside = [expected(begin + 0.02 * (k + 0.5) / 100) for k in range(100)]
+    np.testing.assert_allclose(cells.integrals(mu), 0.02 * np.mean(inside, axis=0), atol=1e-5)
+
+
+@pytest.mark.parametrize("name", [name for name, plant in PLANTS.items() if plant.relative_degree > 0])
+def test_no_held_input_betters_the_floor_and_the_optimum_reaches_what_it_says(name: str) -> None:
+    """Held inputs, random and saturated trackers, by partial fractions: none is below; the program's own is at E."""
+    plant = PLANTS[name].without_delay()
+    omega = 12.0
+    reference = sinusoid(3.0, omega, 0.8, 0.0)
+    period = 2 * math.pi / omega
+    limit = 0.9 * reference.required(plant)
+    program = PeakProgram(realize(plant_block(plant)), 2 * period, 120, False, plant.integrators > 0)
+    r, first = reference(program.time_s), 30 * program.fineness
+    interval = program.solve(r, limit, first)
+    counted = slice(first, program.counted)
+
+    def peak(u: np.ndarray) -> float:
+        y = held_response(plant, program.cell_s, np.append(u, 0.0))
+        return float(np.abs(r - y)[counted].max())
+
+    rng = np.random.default_rng(4)
+    middle = program.time_s[:-1] + program.cell_s / 2
+    angle = np.angle(complex(plant(1j * omega)))
+    tracker = 3.0 / abs(complex(plant(1j * omega))) * np.sin(omega * middle + 0.8 - angle)
+    for trial in range(6):
+        pushed = tracker * (1 + trial / 4) + limit * trial / 4 * np.sin(rng.uniform(1, 40) * middle)
+        assert peak(np.clip(pushed, -limit, limit)) >= interval.lower
+    u, _ = program._optimum(r / 3.0, limit / 3.0, first)
+    assert np.abs(u).max() <= 1.0
+    claimed = 3.0 * program._peak(r / 3.0, limit / 3.0 * u, first)
+    assert peak(limit * u) == pytest.approx(claimed, rel=0.02)
+    assert interval.lower <= peak(limit * u) <= claimed + 1e-9
+
+
+@pytest.mark.parametrize(("limit", "delay_s"), [(10.0, 0.3), (14.0, 0.0)])
+def test_error_from_rest_of_an_integrator(limit: float, delay_s: float) -> None:
+    rest = RestLimit(integrator(7.105, delay_s), CHAPTER_4, limit, steps=100)
+    slope = 7.105 * limit
+    for index in (-1, 0, 40, 48, 100, 400):
+        exact = floor_of_slopes(CHAPTER_4, slope, rest.start_s(index), rest.horizon_s, delay_s)
+        found = rest.at(index)
+        assert found.lower - 0.02 <= exact <= found.upper + 0.02  # of the brute force
+        assert found.upper - found.lower < 0.5
+    assert rest.start_s(-1) == 0.0
+    assert rest.start_s(0) == pytest.approx(delay_s)
+    assert rest.at(-1).lower == pytest.approx(50.0)
+
+
+def test_first_time_within_a_band_from_rest() -> None:
+    rest = RestLimit(integrator(7.105, 0.3), CHAPTER_4, 14.0, steps=100)
+    found = rest.settling(0.5)
+    starts = np.linspace(0.3, 1.5, 481)
+    exact = next(t for t in starts if floor_of_slopes(CHAPTER_4, 7.105 * 14.0, t, 4.0, 0.3) <= 0.5)
+    assert found.lower <= exact <= found.upper + starts[1] - starts[0]
+    assert found.upper - found.lower <= 2.01 * (rest.start_s(1) - rest.start_s(0))
+    assert rest.settling(51.0) == Interval(0.0, 0.0)
+
+
+def test_no_first_time_where_the_floor_is_above_the_band() -> None:
+    found = RestLimit(integrator(7.105), CHAPTER_4, 8.0, steps=60).settling(0.5)
+    assert math.isnan(found.lower)
+    assert math.isnan(found.upper)
+
+
+def test_table_of_the_start_from_rest_falls_and_is_finest_where_it_falls() -> None:
+    ticks: list[int] = []
+    rest = RestLimit(RESONANT, CHAPTER_4, 1.1 * CHAPTER_4.required(RESONANT), steps=60, tick=lambda: ticks.append(1))
+    table = rest.table()
+    assert (table["rest_lower"] <= table["rest_upper"]).all()
+    assert (np.diff(table["rest_lower"]) <= 0).all()
+    assert (np.diff(table["rest_upper"]) <= 0).all()
+    assert (np.diff(table["start_s"]) > 0).all()
+    assert table["start_s"].iloc[:2].tolist() == [0.0, pytest.approx(0.03)]
+    assert table["rest_lower"].iloc[0] == pytest.approx(50.0)
+    assert table["rest_upper"].iloc[-1] < 0.5
+    assert len(ticks) <= 20 <= len(table) < 60
+    falling = table["start_s"][table["rest_upper"] > 0.5]
+    assert np.diff(falling).min() < 0.02
+
+
+@pytest.mark.parametrize(
+    ("plant", "reference", "limit", "words"),
+    [
+        (PlantModel(1.0, (Mode(3.0, 0.1),), (Mode(5.0, 0.1),), 0.0, 0), CHAPTER_4, 1.0, "as many zeros as poles"),
+        (integrator(1.0), sinusoid(1.0, 0.0, 0.0, 1.0), 1.0, "a slowest one above 0"),
+        (integrator(1.0), Reference((1.0, 1.0), (2.0, 3.0), (0.0, 0.0), 0.0), 1.0, "frequencies 2, 3 rad/s"),
+        (integrator(1.0), CHAPTER_4, 0.0, "the limit is 0; expected a positive finite number"),
+        (integrator(1.0), CHAPTER_4, math.inf, "the limit is inf"),
+        (integrator(1.0), CHAPTER_4, math.nan, "the limit is nan"),
+        (PlantModel(1.0, (), (), 0.0, 1, (), (1e9,)), CHAPTER_4, 1.0, "1e\\+09 rad/s, is too fast beside"),
+    ],
+)
+def test_refusals(plant: PlantModel, reference: Reference, limit: float, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        periodic_limit(plant, reference, limit)
+    with pytest.raises(InputError, match=words):
+        RestLimit(plant, reference, limit).at(0)
+
+
+@pytest.mark.parametrize("band", [0.0, math.nan])
+def test_band_must_be_positive(band: float) -> None:
+    with pytest.raises(InputError, match="expected a positive number"):
+        RestLimit(integrator(1.0), CHAPTER_4, 1.0).settling(band)
+
+
+@pytest.fixture(scope="module")
+def tables(extended_design: Design) -> dict[str, pd.DataFrame]:
+    patch = pytest.MonkeyPatch()
+    for name, value in {"STEPS": 60, "FEWER_STEPS": 60, "STARTS": 6, "RUN_PERIODS": 6}.items():
+        patch.setattr(physical_limits, name, value)
+    found = limits_tables(extended_design, [12.5, 9.5])
+    patch.undo()
+    return found
+
+
+def test_no_run_betters_the_floor(tables: dict[str, pd.DataFrame]) -> None:
+    rows, rest = tables["limits_extended"], tables["limits_extended_summary"]
+    for run in ("none", "thesis", "corrected"):
+        assert (rows[f"peak_{run}"] >= rows["periodic_lower"]).all()
+        assert rows[f"ratio_{run}"][0] == pytest.approx(rows[f"peak_{run}"][0] / rows["periodic_lower"][0])
+        assert (rest[f"tail_{run}"] >= rest["rest_lower"] - 1e-9).all()
+        assert (np.diff(rest[f"tail_{run}"]) <= 0).all()
+        settled = rows[f"settling_{run}_s"]
+        assert np.isnan(settled[0])
+        assert np.isnan(settled[1]) or settled[1] >= rows["settling_lower_s"][1]
+    assert rows["ratio_none"].isna().tolist() == [False, True]
+
+
+def test_rows_are_ascending_and_the_summary_is_for_the_first_limit(tables: dict[str, pd.DataFrame]) -> None:
+    rows, rest = tables["limits_extended"], tables["limits_extended_summary"]
+    assert rows["limit"].tolist() == [9.5, 12.5]
+    assert set(rest["limit"]) == {12.5}
+    assert rows["required"].tolist() == pytest.approx([10.556] * 2, abs=1e-3)
+    assert rows["periodic_upper"].tolist()[1] == 0.0
+    assert rows["periodic_lower"][0] == pytest.approx(1.4956, rel=5e-3)
+    assert rows["settling_lower_s"].isna().tolist() == [True, False]
+    assert 0.42 < rows["settling_lower_s"][1] <= rows["settling_upper_s"][1] < 0.48
+
+
+def test_usual_limits(delay_free_design: Design, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The printed one, for which the summary is, and multiples of the required one; nothing is solved here."""
+    monkeypatch.setattr(physical_limits, "periodic_limit", lambda *_: Interval(9.0, 9.0))
+    monkeypatch.setattr(physical_limits, "RUN_PERIODS", 1)
+    monkeypatch.setattr(RestLimit, "at", lambda *_: Interval(1.0, 2.0))
+    monkeypatch.setattr(RestLimit, "_known", lambda *_: Interval(1.0, 2.0))
+    monkeypatch.setattr(physical_limits, "HORIZON", 1)
+    found = limits_tables(delay_free_design)
+    required = found["limits_delay_free"]["required"][0]
+    shares = found["limits_delay_free"]["limit"] / required
+    assert shares.tolist() == pytest.approx([0.8, 0.9, 10.0 / required, 0.95, 0.98, 1.05, 1.2, 1.5])
+    assert set(found["limits_delay_free_summary"]["limit"]) == {10.0}
+    assert found["limits_delay_free"]["settling_lower_s"].isna().all()
+
+
+def test_command_line(extended_design: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def found(design: Design, limits: tuple[float, ...] | None, tick: object) -> dict[str, pd.DataFrame]:
+        asked.append((design.kind, limits))
+        return {"limits_extended": pd.DataFrame({"limit": [2.0]}), "limits_extended_summary": pd.DataFrame({"a": [1]})}
+
+    monkeypatch.setattr("experiments.__main__.limits_tables", found)
+    path = tmp_path / "design.json"
+    path.write_text(extended_design.to_json(), encoding="utf-8")
+    command = ["limits", str(path), "--output", str(tmp_path)]
+    for given in ([], ["--limit", "9", "--limit", "12.5"]):
+        result = CliRunner().invoke(main, [*command, *given])
+        assert (result.exit_code, result.output) == (0, "")
+    assert asked == [("extended", None), ("extended", (9.0, 12.5))]
+    assert sorted(file.name for file in tmp_path.glob("*.csv")) == [
+        "limits_extended.csv",
+        "limits_extended_summary.csv",
+    ]
+
+
+@pytest.mark.parametrize("limit", ["-3", "0", "nan", "inf"])
+def test_command_line_refuses_limits(extended_design: Design, tmp_path: Path, limit: str) -> None:
+    path = tmp_path / "design.json"
+    path.write_text(extended_design.to_json(), encoding="utf-8")
+    result = CliRunner().invoke(
+        main, ["limits", str(path), "--limit", "9", "--limit", limit, "--output", str(tmp_path)]
+    )
+    assert result.exit_code == 2
+    assert result.stderr == f"Error: the limit is {limit}; expected a positive finite number\n"
+    assert not list(tmp_path.glob("*.csv"))
