@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -11,9 +12,12 @@ import pytest
 from click.testing import CliRunner, Result
 
 from design.__main__ import main as design_main
+from design.anti_windup import from_one_plus
+from design.block import Block
 from design.contract import Design
+from design.extended import design_extended
 from experiments.__main__ import main as experiments_main
-from identification.model import read_model
+from identification.model import IdentifiedModel, read_model
 
 
 @pytest.fixture
@@ -138,6 +142,29 @@ def test_simulate_writes_what_it_promises(runner: CliRunner, tmp_path: Path, ext
     np.testing.assert_allclose(table["error"], table["reference"] - table["output"], atol=1e-9)
     np.testing.assert_allclose(table["saturated_control"], table["control"].clip(-12, 12), atol=1e-9)
     np.testing.assert_allclose(table["reference"], 50 * np.sin(1.5 * table["time_s"] + np.pi / 2), atol=1e-9)
+
+
+def test_simulate_takes_a_theta1_of_the_design_and_several_amplitudes(
+    runner: CliRunner, tmp_path: Path, implied: IdentifiedModel
+) -> None:
+    design = design_extended(implied, [1.5, 3.0], 4.0, [(2.0, 1.0), (2.0, 4.0)])
+    kind = from_one_plus(Block(1.0, (0j,), (-25.0 + 0j,)))
+    mine = dataclasses.replace(design, anti_windup={**design.anti_windup, "mine": kind.to_dict()})
+    path, output = tmp_path / "mine.json", tmp_path / "run.csv"
+    path.write_text(mine.to_json(), encoding="utf-8")
+    arguments = ["simulate", str(path), *SIMULATE, "--anti-windup", "mine", "--output", str(output)]
+    arguments += ["--amplitude", "20", "--amplitude", "5", "--phase", "0", "--phase", "1"]
+    result = runner.invoke(experiments_main, arguments)
+    assert result.exit_code == 0, result.output
+    table = pd.read_csv(output)
+    t = table["time_s"]
+    np.testing.assert_allclose(table["reference"], 20 * np.sin(1.5 * t) + 5 * np.sin(3 * t + 1), atol=1e-9)
+    output.unlink()
+    refused(
+        runner.invoke(experiments_main, [*arguments, "--amplitude", "1"]), "2 frequencies, 3 amplitudes and 2 phases"
+    )
+    refused(runner.invoke(experiments_main, [*arguments, "--anti-windup", "his"]), "no anti-windup 'his'", "mine")
+    assert not output.exists()
 
 
 def test_simulate_stops_at_until(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
