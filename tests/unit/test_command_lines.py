@@ -129,6 +129,7 @@ def test_design_refuses_a_missing_folder(runner: CliRunner, tmp_path: Path) -> N
     refused(result, "cannot be written")
 
 
+APPENDIX = ["trade-off", "interpolation", "robustness", "limits"]
 SIMULATE = ["--limit", "12", "--anti-windup", "thesis", "--until", "1", "--sample-time", "0.01"]
 
 
@@ -200,7 +201,7 @@ def test_simulate_refuses_bad_numbers(
     assert not output.exists()
 
 
-@pytest.mark.parametrize("command", ["simulate", "f-gamma", "delay-free", "extended"])
+@pytest.mark.parametrize("command", ["simulate", "f-gamma", "delay-free", "extended", *APPENDIX])
 def test_experiments_refuse_a_missing_design(runner: CliRunner, tmp_path: Path, command: str) -> None:
     options = (
         [*SIMULATE, "--output", str(tmp_path / "run.csv")] if command == "simulate" else ["--output", str(tmp_path)]
