@@ -157,8 +157,8 @@ class _Program:
             rows.append(np.column_stack([-self.shape[at].real, np.zeros(len(at))]))
             limits.append(self.shape_monic[at].real - REAL_PART)
 
-        start = np.arange(0, len(self.omega), 20)
-        for direction in np.exp(0.25j * np.pi * np.arange(8)):
+        start = np.arange(0, len(self.omega), 40)
+        for direction in (1, 1j, -1, -1j):
             bound_magnitude(start, np.full(len(start), direction))
         bound_sector(start)
         bound_phase(start)
