@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -147,8 +148,8 @@ def extended(
 def anti_windup_command(design: Path, name: str, numerator: str, denominator: str, output: Path) -> None:
     """Add a theta1~ of your own, strictly proper and stable, to those of DESIGN."""
     content = read_design(design)
-    if name in ("none", "thesis", "corrected"):
-        raise InputError(f"--name is {name}; expected another name than none, thesis and corrected")
+    if name in ("none", "thesis", "corrected") or not re.fullmatch(r"[\w-]+", name):
+        raise InputError(f"--name is '{name}'; expected letters, digits, _ and -, and not none, thesis or corrected")
     above, below = (
         _coefficients(text, option) for text, option in ((numerator, "numerator"), (denominator, "denominator"))
     )
@@ -173,8 +174,8 @@ def anti_windup_command(design: Path, name: str, numerator: str, denominator: st
 )
 def audit_command(design: Path, windup: float) -> None:
     """Print stability, margins and |W_a C S| of DESIGN with the exact dead time, and judge every anti-windup in it."""
-    if not np.isfinite(windup):
-        raise InputError(f"--windup is {windup:g}; expected a finite number")
+    if not abs(windup) < 1e100:
+        raise InputError(f"--windup is {windup:g}; expected a number of less than 1e100")
     content = read_design(design)
     click.echo(audit_text(content, audit(content), windup))
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
-from design.block import bound_block, plant_block
+from design.block import bound_block, geometric_scale, plant_block, plant_numerator
 from design.contract import Design
 from design.frequency import frequency_grid
 from design.judgement import Judgement, judge, robust_sector
@@ -14,10 +16,12 @@ from design.mixed_sensitivity import Infimum, infimum
 from design.printed_optimum import least_f
 from design.quasi_polynomial import CharacteristicRoots, rightmost_roots
 from design.robustness import Margins, delay_loop, margins_of, tracking_floor
-from design.smith_predictor import anti_windup_controller, smith_controller
+from design.smith_predictor import anti_windup_controller, smith_controller, stabiliser
 from identification.files import InputError
 from identification.model import IdentifiedModel, number
 from identification.plant import AdditiveBound, PlantModel
+
+Result = TypeVar("Result")
 
 ROOTS = 5  # rightmost characteristic roots that are named
 
@@ -29,7 +33,7 @@ class Audit:
     Parameters
     ----------
     roots
-        The rightmost characteristic roots of the nominal loop with its exact dead time.
+        The rightmost characteristic roots of the nominal loop with its exact dead time, or why they were not found.
     margins
         Of the nominal loop, or the sentence that says why it has none.
     with_delay
@@ -41,34 +45,47 @@ class Audit:
     same_controller
         The largest |C_aw/C_s - 1| over a grid of frequencies, of an extended design with the exact inverse; else None.
     infimum
-        Of (2.8), of a delay-free design; else None.
+        Of (2.8), of a delay-free design, or why it was not found; else None.
     anti_windup
         Name -> its judgement.
     robust_sector
-        Name -> the largest sector for every plant within W_a; 0 when |W_a C S| reaches 1.
+        Name -> the largest sector for every plant within W_a; 0 when |W_a C S| reaches 1 or the loop is not stable.
     least_f
         alpha, beta, gamma and f of the best of the printed form (2.23) within the corrected one's bandwidth.
     """
 
-    roots: CharacteristicRoots
+    roots: CharacteristicRoots | str
     margins: Margins | str
     with_delay: Margins | str | None
     tracking_floor: float
     covered_delay_s: float
     same_controller: float | None
-    infimum: Infimum | None
+    infimum: Infimum | str | None
     anti_windup: dict[str, Judgement]
     robust_sector: dict[str, float]
     least_f: tuple[float, float, float, float]
 
 
 def audit(design: Design) -> Audit:
-    """Audit a design; nothing is taken from the file but plant, W_a, blocks and the compensators themselves."""
+    """Audit a design; nothing is taken from the file but plant, W_a, blocks and the compensators themselves.
+
+    Raises
+    ------
+    InputError
+        The blocks do not belong to the plant.
+    """
+    _require_consistent(design)
     plant, bound = design.loop_plant, design.additive_bound
     model = IdentifiedModel(plant, bound, None, {})
     forward, feedback = design.controller_parts()
     P = plant_block(plant)
-    roots = tuple(root for part in (P, forward, feedback) for root in part.zeros + part.poles)
+    loop = delay_loop(design, plant)
+    margins = _attempt(lambda: margins_of(loop, bound))
+    roots = _attempt(lambda: rightmost_roots(loop, ROOTS))
+    blocks = (P, forward, feedback, bound_block(bound))
+    shapes = tuple(root for block in blocks for root in block.zeros + block.poles)
+    if not isinstance(roots, str):
+        shapes += tuple(complex(root) for root in roots.roots)
 
     def robustness(omega: np.ndarray) -> np.ndarray:
         s = 1j * omega
@@ -77,45 +94,67 @@ def audit(design: Design) -> Audit:
 
     same = None
     if design.kind == "extended" and not design.parameters.get("inverse_epsilon"):
-        s = 1j * np.geomspace(1e-3, 1e4, 2000)
+        s = 1j * frequency_grid(shapes, per_decade=20)
+        s = s[np.abs(s) > 1e-2 * number(design.parameters, "a")]  # below, both are differences that vanish
         C_s = smith_controller(plant, design.blocks["C0"], s)
         same = float(np.max(np.abs(anti_windup_controller(plant, forward, feedback, s) / C_s - 1)))
     interval = None
     if design.hinf is not None:
-        interval = infimum(
-            design.blocks["G_A"], design.hinf["W1"], design.hinf["W2"], number(design.hinf, "decay_rate")
-        )
+        W1, W2, decay_rate = design.hinf["W1"], design.hinf["W2"], number(design.hinf, "decay_rate")
+        interval = _attempt(lambda: infimum(design.blocks["G_A"], W1, W2, decay_rate))
+    guaranteed = isinstance(margins, Margins) and margins.is_guaranteed
     kinds = {name: design.compensator(name) for name in design.anti_windup}
+    sectors = {name: robust_sector(kind, robustness, shapes) if guaranteed else 0.0 for name, kind in kinds.items()}
+    delayed = None
+    if plant != design.plant:
+        delayed = _attempt(lambda: margins_of(delay_loop(design, design.plant), bound))
     return Audit(
-        roots=rightmost_roots(delay_loop(design, plant), ROOTS),
-        margins=_margins(design, plant),
-        with_delay=_margins(design, design.plant) if plant != design.plant else None,
+        roots=roots,
+        margins=margins,
+        with_delay=delayed,
         tracking_floor=tracking_floor(plant, bound, design.reference_omegas),
         covered_delay_s=covered_delay(plant, bound),
         same_controller=same,
         infimum=interval,
         anti_windup={name: judge(model, kind) for name, kind in kinds.items()},
-        robust_sector={name: robust_sector(kind, robustness, roots) for name, kind in kinds.items()},
+        robust_sector=sectors,
         least_f=least_f(bound, number(design.anti_windup["corrected"], "bandwidth")),
     )
+
+
+def _attempt(compute: Callable[[], Result]) -> Result | str:
+    """What was computed, or the sentence with which it was refused: the audit goes on without it."""
+    try:
+        return compute()
+    except InputError as error:
+        return str(error)
+
+
+def _require_consistent(design: Design) -> None:
+    """Refuse blocks that do not follow from the plant and from each other, (2.6) or (3.29)."""
+    plant, blocks = design.loop_plant, design.blocks
+    if design.kind == "delay-free":
+        expected, found = plant_numerator(plant) * blocks["Lambda"].inverse(), blocks["G_A"]
+    else:
+        epsilon = float(design.parameters.get("inverse_epsilon", 0.0))
+        expected, found = stabiliser(plant, blocks["T_so"], epsilon)[2], blocks["K"]
+    s = geometric_scale(expected) * np.array([0.1, 1.0 + 0.5j, 7.0])
+    if not np.allclose(found(s), expected(s), rtol=1e-6, atol=0.0):
+        raise InputError("the blocks do not belong to the plant; expected a design that 'python -m design' wrote")
 
 
 def covered_delay(plant: PlantModel, bound: AdditiveBound) -> float:
     """The largest change of the dead time, in seconds, for which the plant stays within W_a; infinite if every one.
 
-    |P| |exp(-j omega tau) - 1| = 2 |P| |sin(omega tau/2)| <= |W_a| at every omega. No change of an integrator's gain is
-    covered by any W_a that is finite at s = 0.
+    |P| |exp(-j omega tau) - 1| = 2 |P| |sin(omega tau/2)| <= |W_a| at every omega. 0 where 2 |P| stays above |W_a| as
+    omega grows. No change of an integrator's gain is covered by any W_a that is finite at s = 0.
     """
     P, W_a = plant_block(plant), bound_block(bound)
+    excess = W_a.relative_degree - P.relative_degree
+    if excess > 0 or (excess == 0 and abs(W_a.gain / P.gain) < 2):
+        return 0.0
     omega = frequency_grid(P.zeros + P.poles + W_a.zeros + W_a.poles, per_decade=200)
     s = 1j * omega
     share = np.abs(W_a(s) / P(s)) / 2
     inside = share < 1
     return float(np.min(2 / omega[inside] * np.arcsin(share[inside]), initial=np.inf))
-
-
-def _margins(design: Design, plant: PlantModel) -> Margins | str:
-    try:
-        return margins_of(delay_loop(design, plant), design.additive_bound)
-    except InputError as error:
-        return str(error)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from design.audit import Audit
+from design.block import bound_block
 from design.contract import Design
+from design.mixed_sensitivity import Infimum
 from design.robustness import Margin, Margins
 from identification.plant import PlantModel
 
@@ -28,40 +31,29 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
     omegas = ", ".join(f"{omega:g}" for omega in design.reference_omegas)
     lines = [f"{design.kind} design, reference at {omegas} rad/s, {_plant_in_words(design.loop_plant)}", ""]
     lines += ["The linear loop" + (", its dead time exact" if design.loop_plant.delay_s else "")]
-    roots, hidden = found.roots.roots, found.roots.hidden
-    lines.append(f"  rightmost characteristic roots  {_roots(roots[~hidden])}")
-    lines.append(f"  cancelled between the blocks    {_roots(roots[hidden]) or 'none'}")
+    if isinstance(found.roots, str):
+        lines.append(f"  rightmost characteristic roots  {found.roots}")
+    else:
+        roots, hidden = found.roots.roots, found.roots.hidden
+        roots = np.where(np.abs(roots.imag) > found.roots.uncertainty, roots, roots.real)
+        lines.append(f"  rightmost characteristic roots  {_roots(roots[~hidden])}")
+        lines.append(f"  cancelled between the blocks    {_roots(roots[hidden]) or 'none'}")
     lines += _margin_lines(found.margins)
     lines.append(
         f"  |W_a/P| at the reference        {found.tracking_floor:.4g}: no controller that follows it has a smaller "
         "peak"
     )
-    lines.append(
-        f"  within W_a                      dead times off by up to {1e3 * found.covered_delay_s:.4g} ms; no other "
-        "gain of "
-        "the integrator"
-    )
+    covered = _covered(found.covered_delay_s)
+    lines.append(f"  within W_a                      {covered}; no other gain of the integrator")
     if found.same_controller is not None:
         lines.append(f"  C_aw = C_s                      to {found.same_controller:.1g}")
     if found.with_delay is not None:
         lines += ["", f"The same controller on the plant with its dead time of {1e3 * design.plant.delay_s:g} ms"]
         lines += _margin_lines(found.with_delay)
     if found.infimum is not None and design.hinf is not None:
-        hinf = design.hinf
-        lines += [
-            "",
-            "H-infinity stabiliser, ||[W1 S; W2 T]||",
-            f"  of this K                       {hinf['gamma']:.6g}",
-            f"  infimum of (2.8)                in [{found.infimum.lower:.6g}, {found.infimum.upper:.6g}], its upper "
-            "end by a "
-            f"K whose loop decays with {found.infimum.decay_rate:.3g} 1/s",
-            f"    no K below                    {found.infimum.reason}",
-            f"  with a decay of {hinf['decay_rate']:<15.4g} in [{hinf['gamma_line_lower']:.6g}, "
-            f"{hinf['gamma_line']:.6g}] on "
-            "that line",
-            f"    no K below                    {hinf['line_reason']}",
-        ]
-    lines += ["", "Anti-windup", *_columns(_anti_windup_rows(found, windup))]
+        lines += ["", "H-infinity stabiliser, ||[W1 S; W2 T]||", *_hinf_lines(design.hinf, found.infimum)]
+    without = ", for the plant without its dead time" if found.with_delay is not None else ""
+    lines += ["", f"Anti-windup{without}", *_columns(_anti_windup_rows(found, windup))]
     alpha, beta, gamma, f = found.least_f
     bandwidth = design.anti_windup["corrected"]["bandwidth"]
     lines += [
@@ -69,14 +61,37 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
         f"The best of (2.23) with no pole beyond {bandwidth:g} rad/s: alpha = {alpha:.4g} s, beta = {beta:.4g} s, "
         "gamma = "
         f"{gamma:.4g}, f = {f:.4g}.",
-        "Without such a bound on the poles there is none: f vanishes as alpha, beta -> 0 and gamma -> -1.",
     ]
+    if bound_block(design.additive_bound).relative_degree > 0:
+        lines.append("Without such a bound on the poles there is none: f vanishes as alpha, beta -> 0 and gamma -> -1.")
     return "\n".join(lines)
 
 
 def _plant_in_words(plant: PlantModel) -> str:
     zeros, poles = len(plant.zero_modes), len(plant.pole_modes)
     return f"plant of gain {plant.gain:g}, {zeros} zero and {poles} pole modes, dead time {1e3 * plant.delay_s:g} ms"
+
+
+def _hinf_lines(hinf: Mapping[str, Any], infimum: Infimum | str) -> Iterable[str]:
+    yield f"  of this K                       {hinf['gamma']:.6g}"
+    if isinstance(infimum, Infimum):
+        yield (
+            f"  infimum of (2.8)                in [{infimum.lower:.6g}, {infimum.upper:.6g}], its upper end by a K "
+            "whose "
+            f"loop decays with {infimum.decay_rate:.3g} 1/s"
+        )
+        yield f"    no K below                    {infimum.reason}"
+    else:
+        yield f"  infimum of (2.8)                {infimum}"
+    ends = f"[{hinf['gamma_line_lower']:.6g}, {hinf['gamma_line']:.6g}]"
+    yield f"  with a decay of {hinf['decay_rate']:<15.4g} in {ends} on that line"
+    yield f"    no K below                    {hinf.get('line_reason', '')}"
+
+
+def _covered(delay_s: float) -> str:
+    if delay_s == 0:
+        return "no other dead time"
+    return "any dead time" if np.isinf(delay_s) else f"dead times off by up to {1e3 * delay_s:.4g} ms"
 
 
 def _roots(roots: np.ndarray) -> str:

@@ -115,6 +115,8 @@ def read_design(path: Path) -> Design:
         hinf = content.get("hinf")
         if hinf is not None:
             hinf = dict(member(content, "hinf"))
+            for name in ("gamma_lower", "gamma", "decay_rate", "gamma_line_lower", "gamma_line"):
+                number(hinf, name)
             hinf |= {name: Block.from_dict(member(hinf, name)) for name in ("W1", "W2")}
         anti_windup = member(content, "anti_windup")
         blocks = member(content, "blocks")
@@ -128,7 +130,9 @@ def read_design(path: Path) -> Design:
             anti_windup={name: member(anti_windup, name) for name in anti_windup},
             parameters=member(content, "parameters"),
         )
-        needed = ("K", "Lambda") if design.kind == "delay-free" else ("K", "T_so")
+        if (hinf is not None) != (design.kind == "delay-free"):
+            raise InputError(f"hinf belongs to a delay-free design and to no other; kind is '{design.kind}'")
+        needed = ("K", "Lambda", "G_A") if design.kind == "delay-free" else ("K", "T_so", "C0")
         for name in needed:
             if name not in design.blocks:
                 raise InputError(f"the block '{name}' is missing")
@@ -136,6 +140,9 @@ def read_design(path: Path) -> Design:
                 raise InputError(f"the block '{name}' has a dead time; expected none, the loop has the plant's")
         for name in {*design.anti_windup, "thesis", "corrected"}:
             design.compensator(name)
+        for name in ("bandwidth", "recovery_s"):
+            if not 1e-100 < number(design.anti_windup["corrected"], name) < 1e100:
+                raise InputError(f"'{name}' of the corrected anti-windup is not a positive number")
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return design

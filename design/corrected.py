@@ -10,16 +10,17 @@ from scipy.optimize import linprog
 from design.anti_windup import AntiWindup, from_one_plus, uncertainty_cost
 from design.block import Block, bound_block, from_polynomial
 from design.frequency import frequency_grid
+from design.popov import popov_sector
 from identification.files import InputError
 from identification.plant import AdditiveBound
 
 SETTLED = 0.01  # what is left of y_d after the recovery time
 TOLERANCE = 1e-6  # of f, relative
-MARGIN = 2e-4  # by which the sector is raised, relative: what lies between the frequencies
+MARGIN = 2e-4  # by which 1/sector is lowered at most, relative: what lies between the frequencies
 PER_DECADE = 200  # frequencies
 REAL_PART = 0.1  # least real part of n over the denominator of W_a on the axis, which keeps the zeros of n stable
 TRIED = 9  # values of b
-HALVINGS = 6  # of the distance to the best one's neighbours
+HALVINGS = 8  # of the distance to the best one's neighbours
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Corrected:
     anti_windup
         theta1~ and 1 + theta1~.
     recovery_s
-        Time in seconds in which y_d falls to 1 % after the actuator has left saturation.
+        Time in seconds in which the slowest mode of theta1~, exp(-rate t), falls to 1 %, at most.
     sector
         Popov's condition holds for the dead zone in this sector, below 1.
     bandwidth
@@ -39,7 +40,7 @@ class Corrected:
     f
         ||W_a (1 + theta1~)||_inf.
     f_lower
-        No n over the same poles meets the linear program's conditions (the sector raised by 2e-4) with a smaller f.
+        No n over the same poles meets the linear program's conditions (a slightly larger sector) with a smaller f.
     """
 
     anti_windup: AntiWindup
@@ -53,11 +54,13 @@ class Corrected:
 def corrected(
     unstable: tuple[complex, ...], bound: AdditiveBound, recovery_s: float, sector: float, bandwidth: float
 ) -> Corrected:
-    """The theta1~ of least f whose theta2 is stable, for a stated sector, recovery time and bandwidth.
+    """The theta1~ of least f in a class whose theta2 is stable, for a stated sector, recovery time and bandwidth.
 
-        1 + theta1~ = prod(s - p_i)/(s + rate)^q * n(s)/(s + b)^N,   rate = ln(100)/recovery_s,  rate <= b <= bandwidth,
+        1 + theta1~ = prod(s - p_i)/(s + rate)^q n(s)/(s + b)^N,  rate = ln(100)/recovery_s,  2 rate <= b <= bandwidth,
 
-    p_i being the q plant poles outside the open left half plane, N the order of W_a, n monic of degree N.
+    p_i being the q plant poles outside the open left half plane, N the order of W_a, n monic of degree N with
+    Re n/d >= 0.1 on the axis, d being W_a's monic denominator; or prod(s - p_i)/(s + bandwidth)^q where that is
+    better.
 
     Parameters
     ----------
@@ -70,7 +73,7 @@ def corrected(
     sector
         k of Theorem 2.3.1, between 0 and 1: with limits +-L the dead zone lies in it as long as |u| <= L/(1 - k).
     bandwidth
-        In rad/s, greater than the rate.
+        In rad/s, more than twice the rate.
 
     Raises
     ------
@@ -86,8 +89,8 @@ def corrected(
     For a given b f and Popov's condition are convex in the coefficients of n, and with the multiplier 0 (the
     circle criterion, which suffices) they become a linear program over half planes: cuts are added where a
     solution violates |W_a (1 + theta1~)| <= f or Re theta1~ + 1/k >= 0 most, until none does by more than TOLERANCE.
-    A third condition, Re n/d >= REAL_PART with d the monic denominator of W_a, keeps the zeros of n stable: the
-    control rings with them as long as the actuator is saturated.
+    The third condition, Re n/d >= REAL_PART, keeps the zeros of n stable, near those of d: the control rings with
+    them as long as the actuator is saturated. What is returned is judged again: sector, and f within 1 % of f_lower.
     Each program is a relaxation, so that its value is a proved lower bound. b is the best of a grid, halved around
     the best one some times: a search by values alone would move the last digits from machine to machine.
     """
@@ -97,14 +100,14 @@ def corrected(
             "expected a positive time and 0 < sector < 1"
         )
     rate = float(np.log(1 / SETTLED)) / recovery_s
-    if not bandwidth > rate:
+    if not 2 * rate < bandwidth < np.inf:
         raise InputError(
-            f"the bandwidth of the anti-windup is {bandwidth:g} rad/s; expected more than {rate:g}, which the recovery "
-            f"in {recovery_s:g} s takes"
+            f"the bandwidth of the anti-windup is {bandwidth:g} rad/s; expected a finite one of more than "
+            f"{2 * rate:g}, twice the rate that the recovery in {recovery_s:g} s takes"
         )
 
     tried: dict[float, tuple[_Program, float, np.ndarray]] = {}
-    trials = np.linspace(np.log(rate), np.log(bandwidth), TRIED)
+    trials = np.linspace(np.log(2 * rate), np.log(bandwidth), TRIED)
     for _ in range(1 + HALVINGS):
         for logarithm in trials:
             program = _Program(unstable, bound, rate, float(np.exp(logarithm)), sector)
@@ -113,13 +116,21 @@ def corrected(
         k = min(range(len(at)), key=lambda k: tried[at[k]][1])
         trials = np.array([(at[k] + at[other]) / 2 for other in (k - 1, k + 1) if 0 <= other < len(at)])
     program, f_lower, coefficients = tried[at[k]]
-    if not np.isfinite(f_lower):
-        raise InputError(
-            f"no theta1~ with poles from {rate:g} to {bandwidth:g} rad/s meets the sector {sector:g}; "
-            "expected a smaller sector or a slower recovery"
-        )
-    kind = program.compensator(coefficients)
-    return Corrected(kind, recovery_s, sector, bandwidth, uncertainty_cost(bound, kind.one_plus)[0], f_lower)
+
+    found: list[tuple[float, float, AntiWindup]] = []
+    if np.isfinite(f_lower):
+        kind = program.compensator(coefficients)
+        found.append((uncertainty_cost(bound, kind.one_plus)[0], f_lower, kind))
+    fastest = from_one_plus(Block(1.0, unstable, (complex(-bandwidth),) * len(unstable)))
+    f = uncertainty_cost(bound, fastest.one_plus)[0]
+    found.append((f, f, fastest))
+    for f, f_lower, kind in sorted(found, key=lambda each: each[0]):
+        if popov_sector(kind.theta1_tilde)[0] >= sector and f <= 1.01 * f_lower:
+            return Corrected(kind, recovery_s, sector, bandwidth, f, f_lower)
+    raise InputError(
+        f"no theta1~ of our class with poles from {rate:g} to {bandwidth:g} rad/s meets the sector {sector:g}; "
+        "expected a smaller sector or a slower recovery"
+    )
 
 
 class _Program:
@@ -135,13 +146,16 @@ class _Program:
         powers = (s[:, None] / b) ** np.arange(self.order + 1)
         basis = self.fixed(s)[:, None] * powers / (1 + s[:, None] / b) ** self.order
         self.basis, self.monic = basis[:, :-1], basis[:, -1]
-        self.W_a = W_a(s)
+        magnitude = np.abs(W_a(s))
+        self.size = float(magnitude.max())
+        self.W_a = W_a(s) / self.size
+        self.margin = min(MARGIN, (1 - sector) / 2)
         # n in units of W_a's monic denominator
         scale = self.b**self.order / np.prod(s[:, None] - np.array(W_a.poles), axis=1)
         self.shape, self.shape_monic = scale[:, None] * powers[:, :-1], scale * powers[:, -1]
 
     def solve(self) -> tuple[float, np.ndarray]:
-        """The least f, to TOLERANCE from below, and the coefficients; infinite and empty when nothing is feasible."""
+        """The least f, to TOLERANCE from below, and the coefficients; infinite and empty when none was found."""
         rows, limits = [], []
 
         def bound_magnitude(at: np.ndarray, direction: np.ndarray) -> None:
@@ -151,7 +165,7 @@ class _Program:
 
         def bound_sector(at: np.ndarray) -> None:
             rows.append(np.column_stack([-self.basis[at].real, np.zeros(len(at))]))
-            limits.append(self.monic[at].real - 1 + (1 - MARGIN) / self.sector)
+            limits.append(self.monic[at].real - 1 + (1 - self.margin) / self.sector)
 
         def bound_phase(at: np.ndarray) -> None:
             rows.append(np.column_stack([-self.shape[at].real, np.zeros(len(at))]))
@@ -171,26 +185,21 @@ class _Program:
                 method="highs",
                 options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
             )
-            if found.status == 2:
+            if found.x is None:  # infeasible, or beyond the solver
                 return np.inf, np.empty(0)
-            if found.x is None:
-                raise InputError(f"the linear program for theta1~ was not solved ({found.message})")
             x, f = found.x[:-1], float(found.x[-1])
             one_plus = self.monic + self.basis @ x
             magnitude, real = np.abs(self.W_a * one_plus), one_plus.real - 1 + 1 / self.sector
             phase = (self.shape_monic + self.shape @ x).real
-            above, below, turned = (
-                magnitude > f * (1 + TOLERANCE),
-                real < MARGIN / 2 / self.sector,
-                phase < (1 - TOLERANCE) * REAL_PART,
-            )
+            above, below = magnitude > f * (1 + TOLERANCE), real < self.margin / 2 / self.sector
+            turned = phase < (1 - TOLERANCE) * REAL_PART
             if not (above.any() or below.any() or turned.any()):
-                break
+                return self.size * f, x
             peaks = np.flatnonzero(above & _local_maximum(magnitude))
             bound_magnitude(peaks, np.exp(-1j * np.angle((self.W_a * one_plus)[peaks])))
             bound_sector(np.flatnonzero(below & _local_maximum(-real)))
             bound_phase(np.flatnonzero(turned & _local_maximum(-phase)))
-        return f, x
+        return np.inf, np.empty(0)
 
     def compensator(self, x: np.ndarray) -> AntiWindup:
         """theta1~ and 1 + theta1~ with these coefficients."""

@@ -13,6 +13,7 @@ from design.block import Block, bound_block, plant_block
 from design.corrected import SETTLED, corrected
 from design.popov import popov_sector, robust_loss
 from design.printed_optimum import thesis_choice
+from identification.files import InputError
 from identification.model import IdentifiedModel
 from identification.plant import PlantModel
 
@@ -129,6 +130,8 @@ def compensators(
     InputError
         A number is out of its range, or no corrected compensator meets the sector.
     """
+    if not (np.isfinite(recovery_s) and recovery_s > 0):
+        raise InputError(f"the recovery time is {recovery_s:g} s; expected a positive time")
     bound = model.additive_bound
     alpha, beta, gamma = thesis_choice(bound)
     if bandwidth is None:

@@ -41,11 +41,13 @@ def popov_sector(
         as u grows without bound, so that k = 1, the most that theta1~(0) = -1 allows, is the boundary case.
     """
     # three decades below the slowest root theta1~ is theta1~(0)
-    grid = frequency_grid(theta1_tilde.zeros + theta1_tilde.poles + roots)
+    grid = frequency_grid(theta1_tilde.zeros + theta1_tilde.poles + roots, per_decade=200)
     values = theta1_tilde(1j * grid)
     lost = np.zeros(len(grid)) if perturbation is None else perturbation(grid)
     if not np.all(np.isfinite(lost)):
         return 0.0, 0.0
+    decade = np.searchsorted(grid, grid[-1] / 10)
+    rolls_off = grid[-1] * lost[-1] <= 2 * grid[decade] * lost[decade]  # or omega times it has no limit, and m is 0
     at_zero = float(theta1_tilde(0j).real)
 
     def lowest(multiplier: float) -> float:
@@ -53,11 +55,14 @@ def popov_sector(
         return min(at_zero, float(left.min()))
 
     time_constants = [1 / abs(pole) for pole in theta1_tilde.poles] or [1.0]
-    trials = np.concatenate([[0.0], np.geomspace(1e-3 * min(time_constants), 1e3 * max(time_constants), 200)])
+    positive = np.geomspace(1e-3 * min(time_constants), 1e3 * max(time_constants), 200)
+    trials = np.concatenate([[0.0], positive if rolls_off else []])
     heights = [lowest(trial) for trial in trials]
     if max(heights) >= 0:
         return float("inf"), float(trials[int(np.argmax(np.array(heights) >= 0))])
     k = int(np.argmax(heights))
+    if not rolls_off:
+        return -1 / heights[0], 0.0
     found = minimize_scalar(
         lambda multiplier: -lowest(multiplier),
         bounds=(trials[max(k - 1, 0)], trials[min(k + 1, len(trials) - 1)]),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
@@ -21,14 +23,21 @@ def optimal_gamma(bound: AdditiveBound, alpha: float, beta: float) -> tuple[floa
     def cost(gamma: float) -> float:
         return uncertainty_cost(bound, second_order(alpha, beta, gamma).one_plus)[0]
 
-    upper = _largest_gamma(bound, alpha, beta)
-    found = minimize_scalar(cost, bounds=(-1.0, upper), method="bounded", options={"xatol": 1e-8 * upper})
-    return float(found.x), float(found.fun)
+    return _minimise(cost, _first_gamma(bound, alpha, beta), 1e-8)
 
 
-def _largest_gamma(bound: AdditiveBound, alpha: float, beta: float) -> float:
-    """Past twice the gamma that puts the zeros at W_a's peak, f grows with gamma."""
+def _first_gamma(bound: AdditiveBound, alpha: float, beta: float) -> float:
+    """Four times the gamma that puts the zeros of 1 + theta1~ at W_a's resonance: where to look first."""
     return 4 * (1 + bound.resonance.omega**2 * alpha * beta)
+
+
+def _minimise(cost: Callable[[float], float], upper: float, tolerance: float) -> tuple[float, float]:
+    """The gamma > -1 that minimises a convex cost, and the minimum; ``upper`` grows until the minimum is inside."""
+    while True:
+        found = minimize_scalar(cost, bounds=(-1.0, upper), method="bounded", options={"xatol": tolerance * upper})
+        if found.x < 0.9 * upper:
+            return float(found.x), float(found.fun)
+        upper *= 4
 
 
 def thesis_choice(bound: AdditiveBound) -> tuple[float, float, float]:
@@ -65,46 +74,49 @@ def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float
 
     Notes
     -----
-    Without a bandwidth there is no optimum: with alpha, beta -> 0 and gamma -> -1 theta1~ tends to -1 at every
-    frequency where W_a is not small, and f to 0.
+    Without a bandwidth there is no optimum where W_a is strictly proper: with alpha, beta -> 0 and gamma -> -1 theta1~
+    tends to -1 at every frequency where W_a is not small, and f to 0.
 
     For given alpha and beta f is convex in gamma, see :func:`optimal_gamma`. Over the two time constants it is
-    not, so that a grid from 1/bandwidth to a hundred times the period of W_a's resonance, with f on fixed
-    frequencies, gives the starts; from the two best the exact f is minimised.
+    not, so that a grid from 1/bandwidth to a hundred times the period of W_a's resonance gives the starts. f is
+    minimised from the two best on fixed frequencies, and from what that gives exactly.
     """
     W_a = bound_block(bound)
     omega = frequency_grid(W_a.zeros + W_a.poles, per_decade=30)
     s, values = 1j * omega, W_a(1j * omega)
     ends = 1 / bandwidth, max(100 / bound.resonance.omega, 100 / bandwidth)
 
-    def on_grid(alpha: float, beta: float) -> float:
+    def on_grid(alpha: float, beta: float, tolerance: float) -> float:
         slope = values / ((1 + alpha * s) * (1 + beta * s))
-        upper = _largest_gamma(bound, alpha, beta)
-        found = minimize_scalar(
-            lambda gamma: float(np.abs(values + gamma * slope).max()),
-            bounds=(-1.0, upper),
-            method="bounded",
-            options={"xatol": 1e-3 * upper},
-        )
-        return float(found.fun)
+        first = _first_gamma(bound, alpha, beta)
+        return _minimise(lambda gamma: float(np.abs(values + gamma * slope).max()), first, tolerance)[1]
+
+    def rough(logarithms: np.ndarray) -> float:
+        alpha, beta = np.exp(logarithms)
+        return on_grid(float(alpha), float(beta), 1e-6)
 
     def exact(logarithms: np.ndarray) -> float:
         alpha, beta = np.exp(logarithms)
         return optimal_gamma(bound, float(alpha), float(beta))[1]
 
-    constants = np.geomspace(*ends, 16)
-    starts = sorted((on_grid(alpha, beta), alpha, beta) for alpha in constants for beta in constants if beta <= alpha)
-    polished = [
-        minimize(
-            exact,
-            np.log(start[1:]),
+    def polish(cost: Callable[[np.ndarray], float], start: np.ndarray, size: float, most: int) -> np.ndarray:
+        limits = [(float(np.log(ends[0])), float(np.log(ends[1])))] * 2
+        simplex = np.clip(start + size * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), *limits[0])
+        found = minimize(
+            cost,
+            start,
             method="Nelder-Mead",
-            bounds=[(float(np.log(ends[0])), float(np.log(ends[1])))] * 2,
-            options={"xatol": 1e-4, "fatol": 1e-8},
+            bounds=limits,
+            options={"maxfev": most, "initial_simplex": simplex},
         )
-        for start in starts[:2]
-    ]
-    best = min(polished, key=lambda found: found.fun)
-    beta, alpha = sorted(float(constant) for constant in np.exp(best.x))
+        return np.asarray(found.x)
+
+    constants = np.geomspace(*ends, 16)
+    starts = sorted(
+        (on_grid(alpha, beta, 1e-3), alpha, beta) for alpha in constants for beta in constants if beta <= alpha
+    )
+    found = [polish(rough, np.log(start[1:]), -0.1, 200) for start in starts[:2]]
+    best = polish(exact, min(found, key=rough), -0.002, 40)
+    beta, alpha = sorted(float(constant) for constant in np.exp(best))
     gamma, f = optimal_gamma(bound, alpha, beta)
     return alpha, beta, gamma, f

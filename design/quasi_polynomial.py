@@ -210,8 +210,8 @@ def trace(functions: Sequence[Terms], line: float, top: float) -> Real:
     omega = omega[omega <= top]
     steep = steepness(omega)
     while len(omega) < POINTS:
-        gaps = np.diff(omega)
-        wide = (gaps * np.maximum(steep[1:], steep[:-1]) > STEP) & (gaps > 1e-9 * omega[1:] + 1e-15 * top)
+        gaps, steeper = np.diff(omega), np.maximum(steep[1:], steep[:-1])
+        wide = (gaps > STEP / np.maximum(steeper, 1e-300)) & (gaps > 1e-9 * omega[1:] + 1e-15 * top)
         if not np.any(wide):
             return omega
         at = np.flatnonzero(wide) + 1
@@ -271,7 +271,7 @@ def _refined(loop: DelayLoop, starts: Complex) -> Complex:
         if not np.any(moving):
             break
         last = size
-        z = np.where(moving, z - step * np.minimum(1.0, (np.abs(z) + q) / np.maximum(size, 1e-300)), z)
+        z = np.where(moving, z - step * (np.minimum(size, np.abs(z) + q) / np.maximum(size, 1e-300)), z)
         z = np.where(starts.imag == 0, z.real, z)
     return np.asarray(z[is_root][np.argsort(-z[is_root].real)])
 

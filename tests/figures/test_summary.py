@@ -98,7 +98,7 @@ def design_of(kind: str) -> Design:
         plant=plant_of(1),
         additive_bound=SIMPLE,
         reference_omegas=(1.5,),
-        blocks={"K": Block(1.0, (), (1 + 0j,)), "T_so": Block(1.0, (), (-4 + 0j, -1 + 2j, -1 - 2j))},
+        blocks={"K": Block(1.0, (), (1 + 0j,)), "C0": Block(1.0), "T_so": Block(1.0, (), (-4 + 0j, -1 + 2j, -1 - 2j))},
         hinf={"gamma": 0.375, "gamma_lower": 0.3125} if kind == "delay-free" else None,
         anti_windup={
             "thesis": {
@@ -111,6 +111,7 @@ def design_of(kind: str) -> Design:
             "corrected": {
                 "sector": 0.75,
                 "recovery_s": 1.75,
+                "bandwidth": 275.0,
                 **judged,
                 "popov_sector": 1.0,
                 "theta2_stable": True,

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -138,7 +141,7 @@ def test_a_theta1_of_ones_own(path: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "part"),
     [
-        (["--name", "thesis", "--numerator", "1", "--denominator", "1 2"], "another name than none, thesis"),
+        (["--name", "thesis", "--numerator", "1", "--denominator", "1 2"], "not none, thesis or corrected"),
         (["--name", "x", "--numerator", "1 two", "--denominator", "1 2"], "--numerator is '1 two'"),
         (["--name", "x", "--numerator", "1", "--denominator", ""], "--denominator is ''"),
         (["--name", "x", "--numerator", "1 0", "--denominator", "1 2"], "strictly proper and stable"),
@@ -158,3 +161,71 @@ def test_a_design_of_an_earlier_version_is_refused(path: Path) -> None:
     result = CliRunner().invoke(main, ["audit", str(path)])
     assert result.exit_code == 2
     assert "schema is 1; expected 2" in result.output
+
+
+def test_the_robust_sector_sees_a_narrow_resonance_of_the_bound(implied: IdentifiedModel) -> None:
+    """|W_a C S| passes 1 on a peak a thousandth as wide as its frequency: no sector is left."""
+    zeta, plant = 1e-3, PlantModel(7.0, (), (), 0.01)
+    for size, robust in ((0.8, False), (0.4, True)):
+        bound = AdditiveBound(2.4 * zeta * size, (), (Mode(33.3, zeta), Mode(300.0, 0.5)), (200.0,), ())
+        model = dataclasses.replace(implied, plant=plant, additive_bound=bound)
+        found = audit(design_extended(model, [1.5], 4.0, [(2.0, 1.0)]))
+        assert not isinstance(found.margins, str)
+        assert found.margins.is_guaranteed == robust
+        assert all((sector > 0) == robust for sector in found.robust_sector.values())
+        if robust:
+            assert found.robust_sector["thesis"] < 0.8
+
+
+def test_an_unstable_loop_has_no_robust_sector(implied: IdentifiedModel) -> None:
+    found = audit(design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=10.0))
+    assert isinstance(found.margins, str)
+    assert set(found.robust_sector.values()) == {0.0}
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_slow_and_fast_plants(implied: IdentifiedModel, scale: float) -> None:
+    plant = PlantModel(7.0 * scale, (Mode(175 * scale, 0.01),), (Mode(282 * scale, 0.02),), 0.008 / scale)
+    bound = AdditiveBound.printed_form(0.002, 20.0 * scale, 280.0 * scale, 0.02)
+    model = dataclasses.replace(implied, plant=plant, additive_bound=bound)
+    design = design_extended(model, [1.5 * scale, 10 * scale], 4.0 * scale, [(3 * scale, 2.25 * scale**2)] * 2)
+    found = audit(design)
+    assert not isinstance(found.margins, str)
+    assert not isinstance(found.roots, str)
+    assert found.same_controller is not None
+    assert found.same_controller < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("change", "part"),
+    [
+        (lambda content: content["blocks"].pop("C0"), "'C0' is missing"),
+        (lambda content: content["plant"].update(gain=14.0), "do not belong to the plant"),
+        (lambda content: content["plant"].update(integrators=2), "has 2 integrators"),
+        (lambda content: content["anti_windup"]["corrected"].update(bandwidth=-5.0), "not a positive number"),
+        (lambda content: content["anti_windup"]["corrected"].update(bandwidth="x"), "expected a number"),
+        (lambda content: content.update(hinf={"gamma": 1.0}), "gamma_lower"),
+        (lambda content: content["anti_windup"]["thesis"]["one_plus"].update(gain=2.0), "is not 1 + theta1_tilde"),
+        (lambda content: content.update(reference_omegas=[-1.0]), "no negative number"),
+        (lambda content: content.update(reference_omegas=1.5), "expected a list"),
+    ],
+)
+def test_an_edited_design_is_refused(path: Path, change: Callable[[dict[str, Any]], object], part: str) -> None:
+    content = json.loads(path.read_text(encoding="utf-8"))
+    change(content)
+    path.write_text(json.dumps(content), encoding="utf-8")
+    result = CliRunner().invoke(main, ["audit", str(path)])
+    assert result.exit_code == 2, result.output
+    assert part in result.output
+    assert "Traceback" not in result.output
+
+
+def test_a_delay_free_design_without_its_norms_is_refused(delay_free_design: Design, tmp_path: Path) -> None:
+    for name in ("gamma", "decay_rate", "gamma_line"):
+        content = json.loads(delay_free_design.to_json())
+        content["hinf"].pop(name)
+        path = tmp_path / "chapter2.json"
+        path.write_text(json.dumps(content), encoding="utf-8")
+        result = CliRunner().invoke(main, ["audit", str(path)])
+        assert result.exit_code == 2
+        assert name in result.output
