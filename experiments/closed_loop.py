@@ -108,38 +108,36 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
     if not (increasing and np.all(np.isfinite(time_s))):
         raise InputError("the sample times are not increasing finite numbers from zero on that end after zero")
     loop = _without_zero_delays(loop)
-    A = csr_array(loop.A)
-    fastest = max(np.abs(np.linalg.eigvals(matrix)).max() for matrix in (loop.A, loop.A + np.outer(loop.B, loop.C)))
+    n, k = len(loop.x0), len(loop.delays)
+    signals = np.array([np.concatenate([x, [0.0], w]) for x, w in loop.outputs.values()]).reshape(-1, n + 1 + k)
+    read = [np.concatenate([loop.C, [0.0], loop.E]), *np.hstack([loop.Z, np.zeros((k, 1 + k))]), *signals]
+    saturated_rows = _compressed(np.vstack([np.hstack([loop.A, loop.B[:, None], loop.D]), *read]))
+    # what u - sat(u) drives is driven by zeros here, and not by rounding
+    free_A, free_D = loop.A + np.outer(loop.B, loop.C), loop.D + np.outer(loop.B, loop.E)
+    unsaturated_rows = _compressed(np.vstack([np.hstack([free_A, np.zeros((n, 1)), free_D]), *read]))
+    fastest = max(np.abs(np.linalg.eigvals(matrix)).max() for matrix in (loop.A, free_A))
     horizon = float(time_s[-1])
-    # 1.5 time constants of the fastest mode leave its last term, read REACH steps on, below the tolerance
-    step = min([1.5 / fastest if fastest > 0 else horizon, *loop.delays])
+    # three time constants of the fastest mode leave its last term, read REACH steps on, below the tolerance
+    step = 3 / fastest if fastest > 0 else horizon
+    if k:  # a whole number of steps in the shortest dead time: most delayed polynomials are read where they start
+        shortest = float(loop.delays.min())
+        step = shortest / np.ceil(shortest / step)
     if horizon / step > MOST_STEPS:
         raise InputError(
             f"the run needs {horizon / step:.3g} steps of {step:.3g} s, set by its shortest dead time or fastest pole; "
             f"expected at most {MOST_STEPS:.3g} (a shorter run, a dead time of zero, or a slower design)"
         )
-    rows = list(loop.outputs.values())
-    outputs_x = np.array([x for x, _ in rows]).reshape(len(rows), len(loop.x0))
-    outputs_w = np.array([w for _, w in rows]).reshape(len(rows), len(loop.delays))
     most_events = 4096
     for _ in range(40):
         values, events, modes, tail, status, end = taylor.integrate(
-            A.indptr,
-            A.indices,
-            A.data,
-            loop.B,
-            loop.D,
-            loop.C,
-            loop.E,
-            loop.Z,
+            *unsaturated_rows,
+            *saturated_rows,
             loop.delays,
             loop.x0,
             float(low),
             float(high),
             horizon,
             step,
-            outputs_x,
-            outputs_w,
             time_s,
             most_events,
         )
@@ -161,6 +159,12 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
         events_s=events,
         modes=modes,
     )
+
+
+def _compressed(dense: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Row pointers, columns and values; unsigned, so that no index is tested for a count from the end."""
+    matrix = csr_array(dense)
+    return matrix.indptr.astype(np.uint32), matrix.indices.astype(np.uint32), matrix.data
 
 
 def _without_zero_delays(loop: SaturatedLoop) -> SaturatedLoop:

@@ -1,4 +1,4 @@
-"""The first sign change of a polynomial on an interval, found without sampling; compiled with numba."""
+"""Where a polynomial first changes sign, and a control leaves its mode, without sampling; compiled with numba."""
 
 from __future__ import annotations
 
@@ -114,3 +114,59 @@ def _root(g: Array, lo: float, hi: float) -> float:
             return following
         tau = following
     return tau
+
+
+@njit(cache=True)
+def leave(
+    U: Array, degree: int, mode: int, on_limit: int, stuck: bool, low: float, high: float, reach: float
+) -> tuple[float, int, int]:
+    """Where on (0, reach] a control leaves its mode, the mode that it enters (-1, 0, 1), and the limit that it crosses.
+
+    Parameters
+    ----------
+    U, degree
+        The control is sum U_i tau^i, i = 0 ... degree.
+    mode, on_limit
+        The present mode; the limit (1 upper, -1 lower, 0 none) on which u lies exactly, just after an event: that root at
+        tau = 0 is divided out.
+    stuck
+        The loop keeps returning there without moving (u touches the limit tangentially): then it is let go.
+    low, high
+        The limits, may be infinite.
+    reach
+        End of the interval.
+
+    Returns
+    -------
+    tau, mode, limit
+        tau is -1 where the control stays in its mode.
+    """
+    best, entered, crossed = -1.0, mode, 0
+    swing, power = 0.0, 1.0  # |u(tau) - u(0)| <= swing
+    for i in range(1, degree + 1):
+        power *= reach
+        swing += abs(U[i]) * power
+    if on_limit == 0 and ((mode >= 0 and U[0] - high > swing) or (mode <= 0 and low - U[0] > swing)):
+        return best, entered, crossed
+    if on_limit == 0 and mode == 0 and high - U[0] > swing and U[0] - low > swing:
+        return best, entered, crossed
+    g = np.zeros(degree + 1)
+    for side in (1, -1):
+        limit = high if side == 1 else low
+        if np.isinf(limit) or (mode != 0 and mode != side):
+            continue
+        # positive inside the mode: side (limit - u) when unsaturated, side (u - limit) when saturated
+        sign = -side if mode == 0 else side
+        for i in range(degree + 1):
+            g[i] = sign * U[i]
+        g[0] -= sign * limit
+        if on_limit == side:
+            for i in range(degree):
+                g[i] = g[i + 1]
+            g[degree] = 0.0
+            if stuck and g[0] <= 0:
+                continue
+        found = 0.0 if g[0] < 0 else first_exit(g, reach)
+        if found >= 0 and (best < 0 or found < best):
+            best, entered, crossed = found, (side if mode == 0 else 0), side
+    return best, entered, crossed

@@ -14,11 +14,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from experiments.crossings import first_exit
+from experiments.crossings import leave
 
 Array = NDArray[Any]
 
-ORDER = 20
+ORDER = 40  # of a series at most; it ends where two terms in a row are negligible
+NEGLIGIBLE = 1e-13  # a term, relative to the largest value of its state so far
 GENERATIONS = 12  # a kink's image after this many dead times is smooth to the order of the series
 REACH = 1.5  # a polynomial is read up to this many steps from where it starts
 
@@ -28,20 +29,20 @@ COMPLETE, DIVERGED, CROWDED = 0, 1, 2
 
 
 @njit(cache=True)
-def _horner(c: Array, tau: float) -> float:
+def _horner(c: Array, degree: int, tau: float) -> float:
     """sum c_i tau^i."""
     value = 0.0
-    for i in range(len(c) - 1, -1, -1):
+    for i in range(degree, -1, -1):
         value = value * tau + c[i]
     return value
 
 
 @njit(cache=True)
-def _dot(a: Array, b: Array) -> float:
-    """sum a_i b_i; for a few terms a loop beats the call of a library."""
+def _row(indptr: Array, indices: Array, data: Array, row: int, v: Array) -> float:
+    """A row of a sparse matrix times v."""
     value = 0.0
-    for i in range(len(a)):
-        value += a[i] * b[i]
+    for q in range(indptr[row], indptr[row + 1]):
+        value += data[q] * v[indices[q]]
     return value
 
 
@@ -65,99 +66,68 @@ def _insert(times: Array, generations: Array, count: int, t: float, generation: 
 
 
 @njit(cache=True)
-def _shift(c: Array, delta: float) -> None:
+def _shift(c: Array, degree: int, delta: float) -> None:
     """Replace the coefficients of p(tau) by those of p(tau + delta), by repeated synthetic division."""
-    for i in range(len(c) - 1):
-        for m in range(len(c) - 2, i - 1, -1):
+    for i in range(degree):
+        for m in range(degree - 1, i - 1, -1):
             c[m] += delta * c[m + 1]
 
 
 @njit(cache=True)
 def _series(
-    indptr: Array, indices: Array, data: Array, B: Array, D: Array, C: Array, E: Array,
-    X: Array, W: Array, U: Array, step: float, saturated: bool, level: float,
-) -> None:  # fmt: skip
-    """Fill X[1:] (ORDER + 1, n) and U (ORDER + 1,) from the state X[0] and the delayed signals W (k, ORDER + 1)."""
-    n, k = X.shape[1], len(W)
-    for i in range(ORDER + 1):
-        u = _dot(C, X[i])
-        for j in range(k):
-            u += E[j] * W[j, i]
-        U[i] = u
-        if i == ORDER:
-            return
-        if saturated:
-            u = level if i == 0 else 0.0
-        factor = step / (i + 1)
-        for r in range(n):
-            rate = B[r] * u
-            for q in range(indptr[r], indptr[r + 1]):
-                rate += data[q] * X[i, indices[q]]
-            for j in range(k):
-                rate += D[r, j] * W[j, i]
-            X[i + 1, r] = factor * rate
+    indptr: Array, indices: Array, data: Array, V: Array, U: Array, n: int, known: int, scale: Array, step: float,
+    level: float,
+) -> int:  # fmt: skip
+    """Fill V[1:, :n + 1] and U (ORDER + 1,) and return the degree.
 
-
-@njit(cache=True)
-def _leave(
-    U: Array, mode: int, on_limit: int, stuck: bool, low: float, high: float, reach: float
-) -> tuple[float, int, int]:
-    """Where on (0, reach] the control leaves its mode, the mode it enters and the limit it crosses; -1 if nowhere.
-
-    Just after an event u lies on a limit exactly; that root at tau = 0 is divided out. ``stuck`` says that the
-    loop keeps returning there without moving (u touches the limit tangentially): then it is let go.
+    V (ORDER + 1, n + 1 + k) holds the terms of (x, m, w), V[0, :n] and the delayed signals to the degree ``known``
+    are given, m is constant; the first n rows of the sparse matrix make x', the next one u.
     """
-    best, entered, crossed = -1.0, mode, 0
-    swing, power = 0.0, 1.0  # |u(tau) - u(0)| <= swing
-    for i in range(1, ORDER + 1):
-        power *= reach
-        swing += abs(U[i]) * power
-    if on_limit == 0 and ((mode >= 0 and U[0] - high > swing) or (mode <= 0 and low - U[0] > swing)):
-        return best, entered, crossed
-    if on_limit == 0 and mode == 0 and high - U[0] > swing and U[0] - low > swing:
-        return best, entered, crossed
-    g = np.zeros(ORDER + 1)
-    for side in (1, -1):
-        limit = high if side == 1 else low
-        if np.isinf(limit) or (mode != 0 and mode != side):
-            continue
-        # positive inside the mode: side (limit - u) when unsaturated, side (u - limit) when saturated
-        sign = -side if mode == 0 else side
-        for i in range(ORDER + 1):
-            g[i] = sign * U[i]
-        g[0] -= sign * limit
-        if on_limit == side:
-            for i in range(ORDER):
-                g[i] = g[i + 1]
-            g[ORDER] = 0.0
-            if stuck and g[0] <= 0:
-                continue
-        found = 0.0 if g[0] < 0 else first_exit(g, reach)
-        if found >= 0 and (best < 0 or found < best):
-            best, entered, crossed = found, (side if mode == 0 else 0), side
-    return best, entered, crossed
+    negligible, power = False, 1.0
+    for i in range(ORDER + 1):
+        now = V[i]
+        U[i] = _row(indptr, indices, data, n, now)
+        now[n] = level if i == 0 else 0.0
+        if i == ORDER:
+            break
+        factor = step / (i + 1)
+        power *= REACH
+        before, negligible = negligible, i + 1 > known
+        following = V[i + 1]
+        for r in range(n):
+            term = 0.0
+            for q in range(indptr[r], indptr[r + 1]):
+                term += data[q] * now[indices[q]]
+            term *= factor
+            following[r] = term
+            if negligible and abs(term) * power > NEGLIGIBLE * scale[r]:
+                negligible = False
+        if before and negligible:
+            U[i + 1] = _row(indptr, indices, data, n, following)
+            return i + 1
+    return ORDER
 
 
 @njit(cache=True)
 def integrate(
-    indptr: Array, indices: Array, data: Array, B: Array, D: Array, C: Array, E: Array, Z: Array, delays: Array,
-    x0: Array, low: float, high: float, horizon: float, step: float, outputs_x: Array, outputs_w: Array,
-    samples: Array, most_events: int,
+    indptr: Array, indices: Array, data: Array, indptr_m: Array, indices_m: Array, data_m: Array, delays: Array,
+    x0: Array, low: float, high: float, horizon: float, step: float, samples: Array, most_events: int,
 ) -> tuple[Array, Array, Array, float, int, float]:  # fmt: skip
     """Integrate one loop from rest of its delayed signals, w_j(t < 0) = Z_j x0.
 
     Parameters
     ----------
     indptr, indices, data
-        A (n, n) in compressed rows.
-    B, D, C, E, Z, delays, x0
-        Shapes (n,), (n, k), (n,), (k,), (k, n), (k,), (n,); delays positive.
+        A matrix in compressed rows over (x (n,), m, w (k,)): n rows [A + B C, 0, D + B E], the loop without saturation,
+        a row [C 0 E], k rows [Z 0 0], and a row for each signal to sample besides u.
+    indptr_m, indices_m, data_m
+        The same with n rows [A B D]: the saturated loop.
+    delays, x0
+        Shapes (k,), (n,); delays positive.
     low, high
         Saturation limits, may be infinite.
     horizon, step
         End time and nominal step in seconds, step <= min(delays).
-    outputs_x, outputs_w
-        Shapes (m, n), (m, k): the signals to sample, besides u.
     samples
         Sorted times (s,) in [0, horizon].
     most_events
@@ -166,29 +136,33 @@ def integrate(
     Returns
     -------
     values (s, 1 + m), events (e,), modes (e,), tail, status, end
-        u and the outputs at the samples; event times with the mode entered (-1, 0, 1); the largest that a series'
-        last term was, as a share of the largest that its state was in the whole run (a state that starts from
-        zero has only high terms at first); COMPLETE, DIVERGED or CROWDED; the time reached.
+        u and the outputs at the samples; event times with the mode entered (-1, 0, 1); the largest that the last
+        term of a series of full order was, as a share of the largest that its state was in the whole run (a state that
+        starts from zero has only high terms at first); COMPLETE, DIVERGED or CROWDED; the time reached.
     """
-    n, k, outputs = len(x0), len(delays), len(outputs_x)
+    n, k = len(x0), len(delays)
+    outputs = len(indptr) - 2 - n - k
     values = np.zeros((len(samples), 1 + outputs))
     events, modes, event_count = np.empty(most_events), np.empty(most_events, np.int64), 0
 
     # the delayed signals' sources, one polynomial a step, and where each dead time reads
-    starts, history, pieces = np.empty(1024), np.empty((1024, k, ORDER + 1)), 0
-    cursor = np.zeros(k, np.int64)
+    starts, degrees, pieces = np.empty(1024), np.empty(1024, np.int64), 0
+    history = np.empty((1024, k, ORDER + 1))
+    cursor, filled = np.zeros(k, np.int64), np.zeros(k, np.int64)
     longest = np.max(delays) if k > 0 else 0.0
-    rest = Z @ x0
 
     # mesh points to come: images of kinks
     queue, generation, queued = np.empty(64), np.empty(64, np.int64), 0
     for j in range(k):
         queue, generation, queued = _insert(queue, generation, queued, delays[j], 1)
 
+    V, U = np.zeros((ORDER + 1, n + 1 + k)), np.zeros(ORDER + 1)
+    V[0, :n] = x0
+    rest = np.array([_row(indptr, indices, data, n + 1 + j, V[0]) for j in range(k)])
+    V[0, n + 1 :] = rest
     x, scale, last = x0.copy(), np.abs(x0), np.zeros(n)
-    X, W, U = np.zeros((ORDER + 1, n)), np.zeros((k, ORDER + 1)), np.zeros(ORDER + 1)
-    Y = np.zeros((outputs, ORDER + 1))
-    u = _dot(C, x) + _dot(E, rest)
+    size, W, Y = np.abs(rest), np.zeros(ORDER + 1), np.zeros(ORDER + 1)
+    u = _row(indptr, indices, data, n, V[0])
     mode = 1 if u > high else (-1 if u < low else 0)
     on_limit, standing = 0, 0
     t, sample, status = 0.0, 0, COMPLETE
@@ -199,21 +173,40 @@ def integrate(
             t_next = min(queue[0], horizon)
         reach = (t_next - t) / step
 
+        known = 0
         for j in range(k):
+            for i in range(filled[j] + 1):
+                V[i, n + 1 + j] = 0.0
+            filled[j] = 0
             start = t - delays[j]
             middle = start + 0.5 * (t_next - t)  # decides the piece: the ends may lie on a kink
             if middle < 0:
-                W[j] = 0.0
-                W[j, 0] = rest[j]
+                V[0, n + 1 + j] = rest[j]
                 continue
             while cursor[j] + 1 < pieces and starts[cursor[j] + 1] <= middle:
                 cursor[j] += 1
-            W[j] = history[cursor[j], j]
-            _shift(W[j], (start - starts[cursor[j]]) / step)
+            piece = cursor[j]
+            degree = degrees[piece]
+            for i in range(degree + 1):
+                W[i] = history[piece, j, i]
+            moved = start - starts[piece]
+            if abs(moved) > 4e-16 * (1.0 + t):  # else the same time, to rounding
+                _shift(W, degree, moved / step)
+            power = REACH**degree
+            while degree > 0 and abs(W[degree]) * power <= NEGLIGIBLE * size[j]:
+                degree -= 1
+                power /= REACH
+            for i in range(degree + 1):
+                V[i, n + 1 + j] = W[i]
+            known, filled[j] = max(known, degree), degree
 
-        X[0] = x
-        _series(indptr, indices, data, B, D, C, E, X, W, U, step, mode != 0, high if mode == 1 else low)
-        exit_at, entered, crossed = _leave(U, mode, on_limit, standing > 2, low, high, reach)
+        V[0, :n] = x
+        if mode == 0:
+            degree = _series(indptr, indices, data, V, U, n, known, scale, step, 0.0)
+        else:
+            level = high if mode == 1 else low
+            degree = _series(indptr_m, indices_m, data_m, V, U, n, known, scale, step, level)
+        exit_at, entered, crossed = leave(U, degree, mode, on_limit, standing > 2, low, high, reach)
         if exit_at >= 0:
             reach = exit_at
             t_next = t + exit_at * step
@@ -224,38 +217,40 @@ def integrate(
                 while first + 1 < pieces and starts[first + 1] < t - longest - step:
                     first += 1
                 room = len(starts) if first > pieces // 2 else 2 * len(starts)
-                kept, kept_history = np.empty(room), np.empty((room, k, ORDER + 1))
-                kept[: pieces - first] = starts[first:pieces]
+                kept, kept_degrees = np.empty(room), np.empty(room, np.int64)
+                kept_history = np.empty((room, k, ORDER + 1))
+                kept[: pieces - first], kept_degrees[: pieces - first] = starts[first:pieces], degrees[first:pieces]
                 kept_history[: pieces - first] = history[first:pieces]
-                starts, history, pieces = kept, kept_history, pieces - first
+                starts, degrees, history, pieces = kept, kept_degrees, kept_history, pieces - first
                 cursor -= first
-            starts[pieces] = t
+            starts[pieces], degrees[pieces] = t, degree
             for j in range(k):
-                for i in range(ORDER + 1):
-                    history[pieces, j, i] = _dot(Z[j], X[i])
+                for i in range(degree + 1):
+                    history[pieces, j, i] = _row(indptr, indices, data, n + 1 + j, V[i])
+                size[j] = max(size[j], abs(history[pieces, j, 0]))
             pieces += 1
 
         if sample < len(samples) and (samples[sample] < t_next or t_next >= horizon):
+            until = sample
+            while until < len(samples) and (samples[until] < t_next or t_next >= horizon):
+                values[until, 0] = _horner(U, degree, (samples[until] - t) / step)
+                until += 1
             for row in range(outputs):
-                for i in range(ORDER + 1):
-                    Y[row, i] = _dot(outputs_x[row], X[i])
-                    for j in range(k):
-                        Y[row, i] += outputs_w[row, j] * W[j, i]
-            while sample < len(samples) and (samples[sample] < t_next or t_next >= horizon):
-                tau = (samples[sample] - t) / step
-                values[sample, 0] = _horner(U, tau)
-                for row in range(outputs):
-                    values[sample, 1 + row] = _horner(Y[row], tau)
-                sample += 1
+                for i in range(degree + 1):
+                    Y[i] = _row(indptr, indices, data, n + 1 + k + row, V[i])
+                for at in range(sample, until):
+                    values[at, 1 + row] = _horner(Y, degree, (samples[at] - t) / step)
+            sample = until
 
         for r in range(n):
-            x[r] = X[ORDER, r]
-        for i in range(ORDER - 1, -1, -1):
+            x[r] = V[degree, r]
+        for i in range(degree - 1, -1, -1):
             for r in range(n):
-                x[r] = x[r] * reach + X[i, r]
+                x[r] = x[r] * reach + V[i, r]
         for r in range(n):
             scale[r] = max(scale[r], abs(x[r]))
-            last[r] = max(last[r], abs(X[ORDER, r]) * REACH**ORDER)
+            if degree == ORDER:
+                last[r] = max(last[r], abs(V[ORDER, r]) * REACH**ORDER)
             if not abs(x[r]) < MOST:
                 status = DIVERGED
         standing = standing + 1 if reach == 0 else 0

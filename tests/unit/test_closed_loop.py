@@ -126,7 +126,7 @@ def test_step_and_order_do_not_matter(extended_design: Design, limit: float, mon
 
     def finer(*arguments: object) -> object:
         changed = list(arguments)
-        changed[13] = arguments[13] / 3.7  # type: ignore[operator]
+        changed[11] = arguments[11] / 3.7  # type: ignore[operator]
         return original(*changed)
 
     monkeypatch.setattr(taylor, "integrate", finer)
