@@ -127,8 +127,8 @@ def leave(
     U, degree
         The control is sum U_i tau^i, i = 0 ... degree.
     mode, on_limit
-        The present mode; the limit (1 upper, -1 lower, 0 none) on which u lies exactly, just after an event: that root at
-        tau = 0 is divided out.
+        The present mode; the limit (1 upper, -1 lower, 0 none) on which u lies exactly, just after an event: that
+        root at tau = 0 is divided out.
     stuck
         The loop keeps returning there without moving (u touches the limit tangentially): then it is let go.
     low, high
