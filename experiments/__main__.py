@@ -56,6 +56,7 @@ def main() -> None:
 @click.option("--amplitude", type=float, multiple=True, help="Of the reference; once a frequency; else the thesis's.")
 @click.option("--phase", type=float, multiple=True, help="In radians; once a frequency; the thesis's unless given.")
 @click.option("--offset", type=float, help="Of the reference; the thesis's unless given.")
+@click.option("--plant", help="The true plant: a model.json, table or implied; the design's own model unless given.")
 @click.option("--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV to write.")
 def simulate_command(
     design: Path,
@@ -69,6 +70,7 @@ def simulate_command(
     amplitude: tuple[float, ...],
     phase: tuple[float, ...],
     offset: float | None,
+    plant: str | None,
     output: Path,
 ) -> None:
     """Run DESIGN from rest: time_s, reference, output, error, control, saturated_control."""
@@ -90,7 +92,8 @@ def simulate_command(
     )
     # the quotient of two decimals may come out a rounding below a whole number
     time_s = sample_time * np.arange(int(until / sample_time * (1 + 1e-12)) + 1)
-    run = simulate(design_loop(content, reference, kind), (-limit, limit), time_s)
+    true_plant = None if plant is None else read_model(plant).plant
+    run = simulate(design_loop(content, reference, kind, true_plant), (-limit, limit), time_s)
     table = pd.DataFrame(
         {
             "time_s": run.time_s,
@@ -101,7 +104,7 @@ def simulate_command(
             "saturated_control": run.saturated_control,
         }
     )
-    write_tables({output: table}, inputs=[design])
+    write_tables({output: table}, inputs=[design, *([Path(plant)] if plant else [])])
     saturated = last_saturation(run)
     said = "saturated to the end" if np.isnan(saturated) else f"last saturated at {saturated:.6g} s"
     click.echo(f"{len(table)} rows -> {output}; {len(run.events_s)} crossings of the limits, {said}")

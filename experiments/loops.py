@@ -13,9 +13,13 @@ from design.contract import Design
 from design.realization import StateSpace, realize
 from experiments.closed_loop import SaturatedLoop
 from experiments.scenarios import PidBenchmark, Reference
+from identification.files import InputError
+from identification.plant import PlantModel
 
 
-def design_loop(design: Design, reference: Reference, anti_windup: AntiWindup | None) -> SaturatedLoop:
+def design_loop(
+    design: Design, reference: Reference, anti_windup: AntiWindup | None, plant: PlantModel | None = None
+) -> SaturatedLoop:
     """The loop of Fig. 2.6 around a design, from rest.
 
     Parameters
@@ -26,6 +30,9 @@ def design_loop(design: Design, reference: Reference, anti_windup: AntiWindup | 
         r(t).
     anti_windup
         theta1~ with 1 + theta1~; None takes theta1 and theta2 out of the loop.
+    plant
+        The true plant, with at least one pole more than zeros; the design's own model unless given. The controller
+        keeps the model in F, K and theta2, dead time and all.
 
     Returns
     -------
@@ -49,15 +56,19 @@ def design_loop(design: Design, reference: Reference, anti_windup: AntiWindup | 
                 +---- y_d <-- theta2 <-- u_tilde            '                |
                 +------------------------------------------------------------+
     """
-    plant = design.loop_plant
+    model = design.loop_plant
+    plant = model if plant is None else plant
+    if plant.relative_degree < 1:
+        raise InputError("the true plant has as many zeros as poles; expected more poles, or the loop is algebraic")
     P = realize(plant_block(plant))
     forward, feedback = (realize(block) for block in design.controller_parts())
     if anti_windup is None:
         theta = realize(Block(0.0), Block(0.0))
     else:
-        theta = realize(anti_windup.theta1_tilde, anti_windup.theta2(plant))
+        theta = realize(anti_windup.theta1_tilde, anti_windup.theta2(model))
     generator, r_row, start = reference.generator()
-    return _assemble(P, forward, feedback, theta, generator, r_row, start, plant.delay_s)
+    delays = np.array([plant.delay_s, model.delay_s, model.delay_s])
+    return _assemble(P, forward, feedback, theta, generator, r_row, start, delays)
 
 
 def _assemble(
@@ -68,7 +79,7 @@ def _assemble(
     generator: np.ndarray,
     r_row: np.ndarray,
     start: np.ndarray,
-    delay_s: float,
+    delays: np.ndarray,
 ) -> SaturatedLoop:
     """States: reference, plant, K/(1+F) or K, T_so, [theta1~; theta2]. Delayed: P's, theta2's and T_so's outputs."""
     sizes = [len(generator), len(P.b), len(forward.b), len(feedback.b), len(theta.b)]
@@ -108,7 +119,7 @@ def _assemble(
         D=D,
         E=v_w,
         Z=Z,
-        delays=np.full(3, delay_s),
+        delays=delays,
         x0=x0,
         outputs={
             "reference": (e_x, np.zeros(3)),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from design.anti_windup import AntiWindup, second_order
+from design.audit import audit
 from design.contract import Design
 from design.extended import design_extended
 from experiments.closed_loop import simulate
@@ -15,7 +18,9 @@ from experiments.loops import design_loop
 from experiments.metrics import last_saturation
 from experiments.pade import with_pade
 from experiments.scenarios import Reference, sinusoid, thesis_reference
+from identification.files import InputError
 from identification.model import IdentifiedModel
+from identification.plant import PlantModel
 
 LIMITS = st.floats(8.0, 40.0)
 FREE = (-np.inf, np.inf)
@@ -144,3 +149,46 @@ def test_every_frequency_of_the_reference_is_followed(
     error = run.outputs["error"]
     assert np.abs(error[run.time_s > 35]).max() < 1e-6
     assert abs(error[0]) > 10
+
+
+def test_another_true_plant_is_another_loop(extended_design: Design) -> None:
+    """The audit's range of true dead times, seen in time: just inside the error dies out, just outside it grows."""
+    margins = audit(extended_design).margins
+    assert not isinstance(margins, str)
+    errors = []
+    for delay_s in (0.9 * margins.delay_greatest_s.value, 1.1 * margins.delay_greatest_s.value):
+        plant = dataclasses.replace(extended_design.plant, delay_s=delay_s)
+        loop = design_loop(extended_design, thesis_reference("extended", [1.5]), None, plant)
+        error = np.abs(simulate(loop, (-np.inf, np.inf), np.linspace(0, 16, 1601)).outputs["error"])
+        errors.append(error[-160:].max() / error[800:960].max())
+    assert errors[0] < 0.9
+    assert errors[1] > 1.1
+
+
+@pytest.mark.parametrize("change", [{"gain": 9.0}, {"gain": 5.0}, {"delay_s": 0.02}, {"delay_s": 0.0}])
+def test_a_mismatch_that_leaves_the_loop_stable_leaves_no_error(
+    extended_design: Design, change: dict[str, float]
+) -> None:
+    """The internal model stays in the controller: the sinusoid is followed although the plant is another."""
+    plant = dataclasses.replace(extended_design.plant, **change)
+    kind = extended_design.compensator("corrected")
+    loop = design_loop(extended_design, thesis_reference("extended", [1.5]), kind, plant)
+    error = np.abs(simulate(loop, (-25.0, 25.0), np.linspace(0, 40, 4001)).outputs["error"])
+    assert error[3500:].max() < 1e-6 * error.max()
+
+
+def test_the_model_as_the_true_plant_changes_nothing(extended_design: Design, delay_free_design: Design) -> None:
+    t = np.linspace(0, 3, 301)
+    for design in (extended_design, delay_free_design):
+        reference = thesis_reference(design.kind, design.reference_omegas)
+        loops = [
+            design_loop(design, reference, design.compensator("thesis"), plant) for plant in (None, design.loop_plant)
+        ]
+        runs = [simulate(loop, (-9.0, 9.0), t).outputs["output"] for loop in loops]
+        np.testing.assert_array_equal(*runs)
+
+
+def test_a_true_plant_that_jumps_is_refused(extended_design: Design) -> None:
+    plant = PlantModel(1.0, (), (), 0.0, integrators=0)
+    with pytest.raises(InputError, match="as many zeros as poles"):
+        design_loop(extended_design, thesis_reference("extended", [1.5]), None, plant)
