@@ -168,6 +168,28 @@ def test_simulate_takes_a_theta1_of_the_design_and_several_amplitudes(
     assert not output.exists()
 
 
+def test_simulate_takes_another_true_plant(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
+    outputs = []
+    for name, plant in (("model", []), ("same", ["--plant", "implied"]), ("other", ["--plant", "table"])):
+        output = tmp_path / f"{name}.csv"
+        arguments = ["simulate", str(extended_json), *SIMULATE, *plant, "--output", str(output)]
+        result = runner.invoke(experiments_main, arguments)
+        assert result.exit_code == 0, result.output
+        outputs.append(pd.read_csv(output)["output"].to_numpy())
+    np.testing.assert_array_equal(outputs[0], outputs[1])
+    assert np.abs(outputs[2] - outputs[0]).max() > 1e-3
+    arguments = [
+        "simulate",
+        str(extended_json),
+        *SIMULATE,
+        "--plant",
+        "nowhere.json",
+        "--output",
+        str(tmp_path / "x.csv"),
+    ]
+    refused(runner.invoke(experiments_main, arguments), "nowhere.json", "no such file")
+
+
 def test_simulate_stops_at_until(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
     output = tmp_path / "run.csv"
     arguments = ["--limit", "12", "--anti-windup", "none", "--until", "1", "--sample-time", "0.6"]
