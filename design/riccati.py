@@ -6,10 +6,11 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError, eigh, eigvals, schur, solve_continuous_lyapunov
+from scipy.linalg import LinAlgError, eigh, eigvals, matrix_balance, schur, solve_continuous_lyapunov
 
 from identification.files import InputError
 
+NEWTON = 4  # steps at most from what the Schur form gives
 RESIDUAL = 1e-6  # of a Riccati equation, relative to its terms
 ROUNDING = 1e-12  # of X, relative to the cost |C1 x|^2 over one unit of time
 
@@ -211,22 +212,28 @@ def _game(plant: GeneralisedPlant) -> tuple[np.ndarray, np.ndarray, np.ndarray, 
 def _riccati(H: np.ndarray, rounding: float) -> tuple[np.ndarray, np.ndarray] | None:
     """Stabilising solution X of the Riccati equation with the Hamiltonian H, and the Newton step from it.
 
-    ``rounding`` is what a zero in the equation may be. None when eigenvalues lie on the axis, or when what was found
-    does not solve the equation.
+    ``rounding`` is what a zero in the equation may be. The invariant subspace is that of H as it is or, where it does
+    not give a solution, of H with states times t and costates over t, so that rows and columns are of like size. None
+    when eigenvalues lie on the axis, or when what was found does not solve the equation.
     """
     n = len(H) // 2
-    _, U, count = schur(H, sort="lhp")
-    if count != n:
-        return None
-    X = np.linalg.solve(U[:n, :n].T, U[n:, :n].T)
-    X = (X + X.T) / 2
+    _, (scale, _) = matrix_balance(np.abs(H), permute=False, separate=True)
+    balanced = np.exp2(np.round(np.log2(scale[:n] / scale[n:]) / 2))
     A, S, Q = H[:n, :n], -H[:n, n:], -H[n:, :n]
-    terms = np.stack([A.T @ X + X @ A, -X @ S @ X, Q])
-    residual = terms.sum(axis=0)
-    closed = A - S @ X
-    if (
-        np.abs(residual).max() > RESIDUAL * np.abs(terms).max(axis=(1, 2)).sum() + rounding
-        or np.max(eigvals(closed).real) >= 0
-    ):
-        return None
-    return X, _lyapunov(closed.T, residual)
+    for t in (np.ones(n), balanced):
+        weights = np.concatenate([t, 1 / t])
+        _, U, count = schur(H * weights / weights[:, None], sort="lhp")
+        if count != n:
+            continue
+        X = np.linalg.solve(U[:n, :n].T, U[n:, :n].T) / np.outer(t, t)
+        X = (X + X.T) / 2
+        for _ in range(NEWTON):
+            terms = np.stack([A.T @ X + X @ A, -X @ S @ X, Q])
+            residual, closed = terms.sum(axis=0), A - S @ X
+            if np.max(eigvals(closed).real) >= 0:
+                break
+            step = _lyapunov(closed.T, residual)
+            if np.abs(residual).max() <= RESIDUAL * np.abs(terms).max(axis=(1, 2)).sum() + rounding:
+                return X, step
+            X = X - step
+    return None
