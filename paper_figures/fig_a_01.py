@@ -50,7 +50,7 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     ends = table["recovery_s"].min(), table["recovery_s"].max()
     for run, kind, label in (
         ("thesis", "thesis anti-windup", "thesis (offset)"),
-        ("least", "second-order Pade", "best of (2.23) (offset)"),
+        ("least", "best of the thesis's form", "best of (2.23) (offset)"),
     ):
         panel.plot(ends, [of_run(summary, run, "f")] * 2, **LINES[kind], label=label)
     own = LINES["corrected anti-windup"]["color"]

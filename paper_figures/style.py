@@ -29,6 +29,7 @@ LINES: dict[str, dict[str, Any]] = {
     "model": {"color": "#000000", "linestyle": "-", "linewidth": 1.2},
     "without anti-windup": {"color": "#D55E00", "linestyle": (0, (5, 1.5)), "linewidth": 1.2},
     "thesis anti-windup": {"color": "#0072B2", "linestyle": "-", "linewidth": 1.0},
+    "best of the thesis's form": {"color": "#0072B2", "linestyle": (0, (2.5, 1.2)), "linewidth": 1.0},
     "corrected anti-windup": {"color": "#009E73", "linestyle": "-", "linewidth": 1.9},
     "saturation limits": {"color": "#000000", "linestyle": (0, (1, 2)), "linewidth": 0.7},
     "bound": {"color": "#CC79A7", "linestyle": (0, (7, 2, 1.5, 2)), "linewidth": 1.6},
