@@ -15,7 +15,7 @@ from design.judgement import Judgement, judge, robust_sector
 from design.mixed_sensitivity import Infimum, infimum
 from design.printed_optimum import least_f
 from design.quasi_polynomial import CharacteristicRoots, rightmost_roots
-from design.robustness import Margins, delay_loop, margins_of, tracking_floor
+from design.robustness import Margins, delay_loop, margins_of, responses, tracking_floor
 from design.smith_predictor import anti_windup_controller, smith_controller, stabiliser
 from identification.files import InputError
 from identification.model import IdentifiedModel, number
@@ -78,19 +78,16 @@ def audit(design: Design) -> Audit:
     plant, bound = design.loop_plant, design.additive_bound
     model = IdentifiedModel(plant, bound, None, {})
     forward, feedback = design.controller_parts()
-    P = plant_block(plant)
     loop = delay_loop(design, plant)
     margins = _attempt(lambda: margins_of(loop, bound))
     roots = _attempt(lambda: rightmost_roots(loop, ROOTS))
-    blocks = (P, forward, feedback, bound_block(bound))
+    blocks = (loop.plant, forward, feedback, bound_block(bound))
     shapes = tuple(root for block in blocks for root in block.zeros + block.poles)
     if not isinstance(roots, str):
         shapes += tuple(complex(root) for root in roots.roots)
 
     def robustness(omega: np.ndarray) -> np.ndarray:
-        s = 1j * omega
-        returned = 1 - feedback(s) * np.exp(-plant.delay_s * s) + P(s) * forward(s)
-        return np.asarray(np.abs(bound(s) * forward(s) / returned))
+        return np.asarray(np.abs(bound(1j * omega) * responses(loop, omega)[1]))
 
     same = None
     if design.kind == "extended" and not design.parameters.get("inverse_epsilon"):

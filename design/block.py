@@ -88,9 +88,14 @@ class Block:
         return len(self.poles) - len(self.zeros)
 
     @property
+    def unstable_poles(self) -> tuple[complex, ...]:
+        """The poles outside the open left half plane, each as often as it is multiple."""
+        return tuple(pole for pole in self.poles if not pole.real < 0)
+
+    @property
     def is_stable(self) -> bool:
         """Whether every pole lies in the open left half plane."""
-        return all(pole.real < 0 for pole in self.poles)
+        return not self.unstable_poles
 
     def to_dict(self) -> dict[str, Any]:
         """The block as design.json holds it."""
@@ -213,6 +218,11 @@ def geometric_scale(*blocks: Block) -> float:
     """
     moduli = [abs(root) for block in blocks for root in block.zeros + block.poles if root != 0]
     return float(np.exp(np.mean(np.log(moduli)))) if moduli else 1.0
+
+
+def fastest_root(*blocks: Block) -> float:
+    """The largest modulus of a zero or pole of the blocks, rad/s."""
+    return max(abs(root) for block in blocks for root in block.zeros + block.poles)
 
 
 def _paired(roots: Iterable[complex]) -> tuple[complex, ...]:

@@ -101,8 +101,8 @@ def coprime_factors(
     factors = CoprimeFactors(
         N_p=n * c.inverse(),
         D_p=d * c.inverse(),
-        X=_numerator(solution[:order], q) * c_observer.inverse(),
-        Y=_numerator(solution[order:], q) * c_observer.inverse(),
+        X=from_polynomial(solution[:order], q) * c_observer.inverse(),
+        Y=from_polynomial(solution[order:], q) * c_observer.inverse(),
     )
     error = _bezout_error(factors, q)
     if not error < ACCURACY:
@@ -171,7 +171,7 @@ def add(first: Block, second: Block) -> Block:
         part[length - len(coefficients) :] = coefficients
     total = parts.sum(axis=0)
     total[np.abs(total) <= ROUNDING * np.abs(parts).sum(axis=0)] = 0.0
-    return _numerator(total, q) * poles.inverse()
+    return from_polynomial(total, q) * poles.inverse()
 
 
 def common_denominator(first: Block, second: Block) -> Block:
@@ -200,10 +200,6 @@ def evaluate(terms: Terms, s: ArrayLike) -> tuple[Complex, Complex, Real]:
         total_slope += (slope - term.delay_s * value) * late
         magnitude += np.abs(value * late)
     return total, total_slope, magnitude
-
-
-def _numerator(coefficients: np.ndarray, q: float) -> Block:
-    return from_polynomial(coefficients, q) if np.any(coefficients) else Block(0.0)
 
 
 def _bezout_error(factors: CoprimeFactors, q: float) -> float:

@@ -25,18 +25,12 @@ HALVINGS = 8  # of the distance to the best one's neighbours
 
 @dataclass(frozen=True)
 class Corrected:
-    """The corrected compensator, and what was asked of it.
+    """The corrected compensator and its cost.
 
     Parameters
     ----------
     anti_windup
         theta1~ and 1 + theta1~.
-    recovery_s
-        Time in seconds in which the slowest mode of theta1~, exp(-rate t), falls to 1 %, at most.
-    sector
-        Popov's condition holds for the dead zone in this sector, below 1.
-    bandwidth
-        In rad/s; no pole of theta1~ is faster.
     f
         ||W_a (1 + theta1~)||_inf.
     f_lower
@@ -44,9 +38,6 @@ class Corrected:
     """
 
     anti_windup: AntiWindup
-    recovery_s: float
-    sector: float
-    bandwidth: float
     f: float
     f_lower: float
 
@@ -69,11 +60,11 @@ def corrected(
     bound
         W_a.
     recovery_s
-        In seconds, positive.
+        Time in seconds in which the slowest mode of theta1~, exp(-rate t), falls to 1 % at most; positive.
     sector
         k of Theorem 2.3.1, between 0 and 1: with limits +-L the dead zone lies in it as long as |u| <= L/(1 - k).
     bandwidth
-        In rad/s, more than twice the rate.
+        In rad/s, more than twice the rate; no pole of theta1~ is faster.
 
     Raises
     ------
@@ -126,7 +117,7 @@ def corrected(
     found.append((f, f, fastest))
     for f, f_lower, kind in sorted(found, key=lambda each: each[0]):
         if popov_sector(kind.theta1_tilde)[0] >= sector and f <= 1.01 * f_lower:
-            return Corrected(kind, recovery_s, sector, bandwidth, f, f_lower)
+            return Corrected(kind, f, f_lower)
     raise InputError(
         f"no theta1~ of our class with poles from {rate:g} to {bandwidth:g} rad/s meets the sector {sector:g}; "
         "expected a smaller sector or a slower recovery"

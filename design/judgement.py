@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from design.anti_windup import AntiWindup, second_order, uncertainty_cost
-from design.block import Block, bound_block, plant_block
+from design.block import Block, bound_block, fastest_root, plant_block
 from design.corrected import SETTLED, corrected
 from design.popov import popov_sector, robust_loss
 from design.printed_optimum import thesis_choice
@@ -80,10 +80,9 @@ def lasting_offset(plant: PlantModel, kind: AntiWindup) -> float | None:
     theta2 has worse poles than one at s = 0.
     """
     theta2 = kind.theta2(plant)
-    worse = [pole for pole in theta2.poles if pole.real >= 0]
-    if not worse:
+    if theta2.is_stable:
         return 0.0
-    if worse != [0j]:
+    if theta2.unstable_poles != (0j,):
         return None
     return float((theta2 * Block(1.0, (0j,)))(0j).real)
 
@@ -136,8 +135,7 @@ def compensators(
     alpha, beta, gamma = thesis_choice(bound)
     if bandwidth is None:
         bandwidth = default_bandwidth(model, recovery_s)
-    unstable = tuple(pole for pole in plant_block(model.plant).poles if pole.real >= 0)
-    found = corrected(unstable, bound, recovery_s, sector, bandwidth)
+    found = corrected(plant_block(model.plant).unstable_poles, bound, recovery_s, sector, bandwidth)
     return {
         "thesis": {"alpha": alpha, "beta": beta, "gamma": gamma} | facts(model, second_order(alpha, beta, gamma)),
         "corrected": {"sector": sector, "bandwidth": bandwidth, "f_lower": found.f_lower}
@@ -147,8 +145,7 @@ def compensators(
 
 def default_bandwidth(model: IdentifiedModel, recovery_s: float) -> float:
     """The fastest root of plant and W_a in rad/s, or ten times the rate of the recovery where that is more."""
-    P, W_a = plant_block(model.plant), bound_block(model.additive_bound)
-    fastest = max(abs(root) for root in P.zeros + P.poles + W_a.zeros + W_a.poles)
+    fastest = fastest_root(plant_block(model.plant), bound_block(model.additive_bound))
     return max(fastest, 10 * float(np.log(1 / SETTLED)) / recovery_s)
 
 

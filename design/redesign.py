@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.block import Block, bound_block, plant_block
+from design.block import Block, bound_block, fastest_root, plant_block
 from design.frequency import peak
 from design.robustness import tracking_floor
 from design.smith_predictor import FreePart, rolled_off, stabiliser
@@ -111,8 +111,7 @@ def robust_free_part(
 
 def _ends(model: IdentifiedModel, wanted: Conditions) -> tuple[float, float]:
     """A decade above the fastest root of plant and W_a, and a hundredth of the slowest of what T_so already has."""
-    P, W_a = plant_block(model.plant), bound_block(model.additive_bound)
-    fastest = max(abs(root) for root in (*P.zeros, *P.poles, *W_a.zeros, *W_a.poles))
+    fastest = fastest_root(plant_block(model.plant), bound_block(model.additive_bound))
     return 10 * max(fastest, wanted.a), min((wanted.a, *wanted.omegas)) / 100
 
 

@@ -162,6 +162,14 @@ def margins_of(loop: DelayLoop, bound: AdditiveBound) -> Margins:
     )
 
 
+def responses(loop: DelayLoop, omega: Real) -> tuple[Complex, Complex]:
+    """S and C S of a loop at frequencies omega (n,) in rad/s, its dead times exact; finite at the poles of C."""
+    s = 1j * omega
+    inner = 1 - loop.feedback(s) * np.exp(-loop.delay_s * s)
+    returned = inner + loop.plant(s) * loop.forward(s)
+    return np.asarray(inner / returned), np.asarray(loop.forward(s) / returned)
+
+
 def tracking_floor(plant: PlantModel, bound: AdditiveBound, omegas: ArrayLike) -> float:
     """A lower bound on ||W_a C S|| of every controller that follows a reference of these frequencies perfectly.
 

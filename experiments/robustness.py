@@ -10,7 +10,7 @@ import pandas as pd
 from design.block import plant_block
 from design.contract import Design
 from design.frequency import frequency_grid
-from design.robustness import delay_loop, margins_of, tracking_floor
+from design.robustness import delay_loop, margins_of, responses, tracking_floor
 from identification.files import InputError
 
 
@@ -42,16 +42,15 @@ def robustness_tables(designs: Mapping[str, Design]) -> dict[str, pd.DataFrame]:
     P = plant_block(first.loop_plant)
     W_a = first.additive_bound
     parts = [P, *(part for design in designs.values() for part in design.controller_parts())]
-    omega = frequency_grid({root: None for part in parts for root in part.zeros + part.poles}, per_decade=40)
+    omega = frequency_grid((root for part in parts for root in part.zeros + part.poles), per_decade=40)
     s = 1j * omega
     columns = {"omega": omega, "floor": np.abs(W_a(s) / P(s))}
     rows = []
     for name, design in designs.items():
-        forward, feedback = design.controller_parts()
-        returned = 1 - feedback(s) * np.exp(-first.loop_plant.delay_s * s)
-        columns[f"robustness_{name}"] = np.abs(W_a(s) * forward(s) / (returned + P(s) * forward(s)))
-        columns[f"sensitivity_{name}"] = np.abs(returned / (returned + P(s) * forward(s)))
-        margins = margins_of(delay_loop(design, first.loop_plant), W_a)
+        loop = delay_loop(design, first.loop_plant)
+        S, C_S = responses(loop, omega)
+        columns[f"robustness_{name}"], columns[f"sensitivity_{name}"] = np.abs(W_a(s) * C_S), np.abs(S)
+        margins = margins_of(loop, W_a)
         rows.append(
             {
                 "run": name,

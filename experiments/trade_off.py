@@ -40,7 +40,7 @@ def trade_off_tables(design: Design, tick: Callable[[], object] = lambda: None) 
     facts = design.anti_windup["corrected"]
     bandwidth, own = number(facts, "bandwidth"), number(facts, "recovery_s")
     bound = design.additive_bound
-    unstable = tuple(pole for pole in plant_block(design.plant).poles if pole.real >= 0)
+    unstable = plant_block(design.plant).unstable_poles
     rows = []
     for recovery_s in np.geomspace(3 * np.log(1 / SETTLED) / bandwidth, 5 * own, RECOVERIES):
         for sector in SECTORS:

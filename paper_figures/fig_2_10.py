@@ -10,11 +10,9 @@ from matplotlib.figure import Figure
 from paper_figures import panels, style
 from paper_figures.captions import fraction, number, only
 from paper_figures.f_gamma import curves, lowest
-from paper_figures.style import COLUMN_WIDTH, LINES, styled
+from paper_figures.style import COLUMN_WIDTH, FAMILY, LINES, styled
 
 TABLES: tuple[str, ...] = ("f_gamma", "f_gamma_summary")
-
-FAMILY = [name for name in LINES if name.startswith("family")]
 
 
 def caption(tables: Mapping[str, pd.DataFrame]) -> str:

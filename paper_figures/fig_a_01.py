@@ -9,11 +9,9 @@ from matplotlib.figure import Figure
 
 from paper_figures import panels, style
 from paper_figures.captions import number, of_run
-from paper_figures.style import COLUMN_WIDTH, LINES, styled
+from paper_figures.style import COLUMN_WIDTH, FAMILY, LINES, styled
 
 TABLES: tuple[str, ...] = ("trade_off", "trade_off_summary")
-
-FAMILY = [name for name in LINES if name.startswith("family")]
 
 
 def caption(tables: Mapping[str, pd.DataFrame]) -> str:

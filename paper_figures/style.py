@@ -46,6 +46,9 @@ LINES: dict[str, dict[str, Any]] = {
 The family is one function at several values of a parameter, the first of them the chosen value.
 """
 
+FAMILY = [name for name in LINES if name.startswith("family")]
+"""The entries of the family, in the order of its values."""
+
 _METADATA: dict[str, dict[str, None]] = {
     "pdf": {"CreationDate": None, "ModDate": None},
     "svg": {"Date": None},

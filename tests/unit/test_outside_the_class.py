@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,16 +16,6 @@ from design.smith_predictor import stabiliser
 from experiments.closed_loop import SaturatedLoop, simulate
 from identification.model import IdentifiedModel
 from identification.plant import AdditiveBound, Mode, PlantModel
-
-ROOT = Path(__file__).resolve().parents[2]
-
-
-def test_every_test_that_the_page_names_exists() -> None:
-    text = (ROOT / "docs" / "outside_the_class.md").read_text(encoding="utf-8")
-    named = re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", text)
-    assert len(named) >= 7
-    for file, name in named:
-        assert f"def {name}(" in (ROOT / file).read_text(encoding="utf-8"), f"{file}::{name}"
 
 
 def loop_with_delay(design: Design, delay_s: float) -> DelayLoop:
