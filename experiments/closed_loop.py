@@ -15,6 +15,25 @@ MOST_STEPS = 2e7  # a few minutes
 
 
 @dataclass(frozen=True)
+class Resets:
+    """From outside, the first g states jump: at ``times_s[i]`` they take ``values[i]``.
+
+    Parameters
+    ----------
+    times_s
+        Shape (b,), increasing, positive.
+    values
+        Shape (b, g).
+    """
+
+    times_s: np.ndarray
+    values: np.ndarray
+
+
+NO_RESETS = Resets(np.zeros(0), np.zeros((0, 0)))
+
+
+@dataclass(frozen=True)
 class SaturatedLoop:
     """x' = A x + B m + D w, u = C x + E w, m = sat(u), w_j(t) = Z_j x(t - delays_j).
 
@@ -29,6 +48,8 @@ class SaturatedLoop:
         Initial state (n,).
     outputs
         Name -> (row over x (n,), row over w (k,)).
+    resets
+        Of a reference that is generated piece by piece.
     """
 
     A: np.ndarray
@@ -40,6 +61,7 @@ class SaturatedLoop:
     delays: np.ndarray
     x0: np.ndarray
     outputs: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    resets: Resets = NO_RESETS
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,16 @@ from design.block import Block, plant_block
 from design.contract import Design
 from design.realization import StateSpace, realize
 from experiments.closed_loop import SaturatedLoop
-from experiments.scenarios import PidBenchmark, Reference
+from experiments.scenarios import Generator, PidBenchmark, Reference, SampledReference
 from identification.files import InputError
 from identification.plant import PlantModel
 
 
 def design_loop(
-    design: Design, reference: Reference, anti_windup: AntiWindup | None, plant: PlantModel | None = None
+    design: Design,
+    reference: Reference | SampledReference,
+    anti_windup: AntiWindup | None,
+    plant: PlantModel | None = None,
 ) -> SaturatedLoop:
     """The loop of Fig. 2.6 around a design, from rest.
 
@@ -66,9 +69,8 @@ def design_loop(
         theta = realize(Block(0.0), Block(0.0))
     else:
         theta = realize(anti_windup.theta1_tilde, anti_windup.theta2(model))
-    generator, r_row, start = reference.generator()
     delays = np.array([plant.delay_s, model.delay_s, model.delay_s])
-    return _assemble(P, forward, feedback, theta, generator, r_row, start, delays)
+    return _assemble(P, forward, feedback, theta, reference.generator(), delays)
 
 
 def _assemble(
@@ -76,13 +78,11 @@ def _assemble(
     forward: StateSpace,
     feedback: StateSpace,
     theta: StateSpace,
-    generator: np.ndarray,
-    r_row: np.ndarray,
-    start: np.ndarray,
+    generator: Generator,
     delays: np.ndarray,
 ) -> SaturatedLoop:
     """States: reference, plant, K/(1+F) or K, T_so, [theta1~; theta2]. Delayed: P's, theta2's and T_so's outputs."""
-    sizes = [len(generator), len(P.b), len(forward.b), len(feedback.b), len(theta.b)]
+    sizes = [len(generator.start), len(P.b), len(forward.b), len(feedback.b), len(theta.b)]
     edges = np.concatenate([[0], np.cumsum(sizes)])
     at_r, at_P, at_K, at_T, at_theta = (slice(a, b) for a, b in pairwise(edges))
     n = int(edges[-1])
@@ -96,12 +96,12 @@ def _assemble(
 
     # w = (y, y_d, [T_so v] delayed), each a function of the states only: P, theta2 and T_so are strictly proper
     Z = np.stack([row(P=P.C[0]), row(theta=theta.C[1]), row(T=feedback.C[0])])
-    e_x, e_w = row(r=r_row), np.array([-1.0, -1.0, 0.0])
+    e_x, e_w = row(r=generator.row), np.array([-1.0, -1.0, 0.0])
     v_x = row(K=forward.C[0]) + forward.d[0] * e_x
     v_w = forward.d[0] * e_w + np.array([0.0, 0.0, 1.0])
     u_x = v_x - row(theta=theta.C[0])
 
-    A = block_diag(generator, P.A, forward.A, feedback.A, theta.A)
+    A = block_diag(generator.matrix, P.A, forward.A, feedback.A, theta.A)
     D = np.zeros((n, 3))
     A[at_K] += np.outer(forward.b, e_x)
     D[at_K] += np.outer(forward.b, e_w)
@@ -110,7 +110,7 @@ def _assemble(
     A[at_theta] += np.outer(theta.b, u_x)  # driven by u_tilde = u - m
     D[at_theta] += np.outer(theta.b, v_w)
     B = row(P=P.b) - row(theta=theta.b)
-    x0 = row(r=start)
+    x0 = row(r=generator.start)
     y = np.array([1.0, 0.0, 0.0])
     return SaturatedLoop(
         A=A,
@@ -128,6 +128,7 @@ def _assemble(
             "y_lin": (np.zeros(n), np.array([1.0, 1.0, 0.0])),
             "v": (v_x, v_w),
         },
+        resets=generator.resets,
     )
 
 

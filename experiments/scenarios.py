@@ -9,19 +9,38 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
+from experiments.closed_loop import NO_RESETS, Resets
 from identification.files import InputError
 from identification.plant import PlantModel
 from identification.thesis import printed
 
 
 @dataclass(frozen=True)
-class Reference:
-    """r(t) = sum of amplitude_i sin(omega_i t + phase_i), and an offset.
+class Generator:
+    """z' = matrix z from z(0) = start with resets; r = row z.
 
     Parameters
     ----------
-    amplitudes, offset
-        In the plant's output unit.
+    matrix, row, start
+        Shapes (g, g), (g,), (g,).
+    resets
+        Of all its states.
+    """
+
+    matrix: np.ndarray
+    row: np.ndarray
+    start: np.ndarray
+    resets: Resets
+
+
+@dataclass(frozen=True)
+class Reference:
+    """r(t) = sum of amplitude_i sin(omega_i t + phase_i) + offset + slope t.
+
+    Parameters
+    ----------
+    amplitudes, offset, slope
+        In the plant's output unit, and in that unit per second.
     omegas
         In rad/s, not negative; as many as there are amplitudes.
     phases_rad
@@ -32,6 +51,7 @@ class Reference:
     omegas: tuple[float, ...]
     phases_rad: tuple[float, ...]
     offset: float
+    slope: float = 0.0
 
     def __post_init__(self) -> None:
         if not len(self.amplitudes) == len(self.omegas) == len(self.phases_rad) > 0:
@@ -39,14 +59,15 @@ class Reference:
                 f"the reference has {len(self.omegas)} frequencies, {len(self.amplitudes)} amplitudes and "
                 f"{len(self.phases_rad)} phases; expected as many of each, and one at least"
             )
-        numbers = [*self.amplitudes, *self.omegas, *self.phases_rad, self.offset]
+        numbers = [*self.amplitudes, *self.omegas, *self.phases_rad, self.offset, self.slope]
         if not np.isfinite(numbers).all() or min(self.omegas) < 0:
             raise InputError(f"the reference is {self}; expected finite numbers and omega >= 0")
 
     def __call__(self, time_s: np.ndarray) -> np.ndarray:
         """r at times of any shape."""
         parts = zip(self.amplitudes, self.omegas, self.phases_rad, strict=True)
-        return np.asarray(sum(a * np.sin(omega * time_s + phase) for a, omega, phase in parts) + self.offset)
+        waves = sum(a * np.sin(omega * time_s + phase) for a, omega, phase in parts)
+        return np.asarray(waves + self.offset + self.slope * time_s)
 
     @property
     def amplitude(self) -> float:
@@ -62,17 +83,68 @@ class Reference:
     def required(self, plant: PlantModel) -> float:
         """The most that the control reaches which makes the plant's output r in the steady state, in its input unit.
 
-        The sum of amplitude/|P(j omega)|; 0 at omega = 0, where the plant integrates.
+        The sum of amplitude/|P(j omega)|; 0 at omega = 0, where the plant integrates; and |slope/gain| of a plant
+        with one integrator.
         """
         parts = zip(self.amplitudes, self.omegas, strict=True)
-        return float(sum(abs(a / complex(plant(1j * omega))) for a, omega in parts if omega > 0))
+        waves = sum(abs(a / complex(plant(1j * omega))) for a, omega in parts if omega > 0)
+        if self.slope == 0 or plant.integrators > 1:
+            return float(waves)
+        return math.inf if plant.integrators == 0 else float(waves + abs(self.slope / plant.gain))
 
-    def generator(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The autonomous system that generates r: matrix (n, n), output row (n,), initial state (n,)."""
-        matrix = block_diag(*(np.array([[0.0, omega], [-omega, 0.0]]) for omega in self.omegas), np.zeros((1, 1)))
+    def generator(self) -> Generator:
+        """Its oscillators, and a constant with its integral."""
+        matrix = block_diag(*(np.array([[0.0, omega], [-omega, 0.0]]) for omega in self.omegas), [[0, 1], [0, 0]])
         row = [number for amplitude in self.amplitudes for number in (amplitude, 0.0)]
         start = [number for phase in self.phases_rad for number in (math.sin(phase), math.cos(phase))]
-        return matrix, np.array([*row, self.offset]), np.array([*start, 1.0])
+        return Generator(matrix, np.array([*row, 1.0, 0.0]), np.array([*start, self.offset, self.slope]), NO_RESETS)
+
+
+@dataclass(frozen=True)
+class SampledReference:
+    """r(t) by straight lines between samples; before the first and after the last it stays as it is there.
+
+    Parameters
+    ----------
+    time_s
+        Shape (s,), increasing, in seconds.
+    values
+        Shape (s,), in the plant's output unit.
+    """
+
+    time_s: np.ndarray
+    values: np.ndarray
+
+    def __post_init__(self) -> None:
+        if not (self.time_s.shape == self.values.shape and self.time_s.ndim == 1 and len(self.time_s) > 0):
+            raise InputError(
+                f"the sampled reference has shapes {self.time_s.shape} and {self.values.shape}; expected as many times "
+                "as values, and one at least"
+            )
+        if not (np.isfinite(self.time_s).all() and np.isfinite(self.values).all()):
+            raise InputError("the sampled reference is not finite; expected finite numbers")
+        if np.any(np.diff(self.time_s) <= 0):
+            raise InputError("the times of the sampled reference do not increase; expected increasing times")
+
+    def __call__(self, time_s: np.ndarray) -> np.ndarray:
+        """r at times of any shape."""
+        return np.interp(time_s, self.time_s, self.values)
+
+    @property
+    def amplitude(self) -> float:
+        """Half the distance of its extremes, in the plant's output unit."""
+        return float(np.ptp(self.values)) / 2
+
+    def generator(self) -> Generator:
+        """An integrator and its slope, both set at every sample after t = 0."""
+        knots = np.union1d(self.time_s[self.time_s > 0], 0.0)
+        levels = self(knots)
+        slopes = np.append(np.diff(levels) / np.diff(knots), 0.0)
+        if knots[0] < self.time_s[0]:
+            slopes[0] = 0.0
+        pieces = np.column_stack([levels, slopes])
+        matrix, row = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([1.0, 0.0])
+        return Generator(matrix, row, pieces[0], Resets(knots[1:], pieces[1:]))
 
 
 def sinusoid(amplitude: float, omega: float, phase_rad: float, offset: float) -> Reference:

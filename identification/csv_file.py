@@ -1,9 +1,10 @@
-"""A CSV of sweeps -> one table for each test in it."""
+"""A CSV -> its columns of numbers; a CSV of sweeps -> one table for each test in it."""
 
 from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +16,17 @@ SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 
 
 def read_csv(path: Path) -> list[Table]:
+    """Read the tests of a CSV of sweeps, see :func:`read_columns`."""
+    return read_columns(path, lambda place, header: choose_columns(place, header, "columns", may_be_complex=False))
+
+
+def read_columns(path: Path, choose: Callable[[str, list[str]], Sequence[str]]) -> list[Table]:
     """Read the tests of a CSV: a header line with the columns' names, then a line for each point.
 
-    What the header is separated by, commas, semicolons or tabs, separates every line. Decimals have a point. Blank
-    lines and those that begin with '#' are left out, and so are columns of other names.
+    ``choose`` gets what to call the header's place and its names, and gives the names of the columns to read. A
+    column ``test`` tells tests apart. What the header is separated by, commas, semicolons or tabs, separates every
+    line. Decimals have a point. Blank lines and those that begin with '#' are left out, and so are columns of other
+    names.
 
     Raises
     ------
@@ -33,7 +41,7 @@ def read_csv(path: Path) -> list[Table]:
     place = f"{path}, line {rows[0][0]}"
     separator = _separator(place, rows[0][1])
     header = _fields(path, *rows[0], separator)
-    wanted = choose_columns(place, header, "columns", may_be_complex=False)
+    wanted = choose(place, header)
     if len(rows) == 1:
         raise InputError(f"{path}: holds a header and no numbers; expected a line for each point")
     cells = [_fields(path, n, line, separator) for n, line in rows[1:]]
