@@ -20,6 +20,7 @@ REFIT :=
 
 PY := .venv/bin/python
 READY := .venv/.ready
+BENCH_READY := .venv/.bench-ready
 RESULTS := $(BUILD)/results
 FIGURES := $(BUILD)/figures
 SUMMARY := $(addprefix $(BUILD)/summary.,pdf svg png txt)
@@ -41,14 +42,15 @@ LIMITS := $(if $(LIMIT),--limit $(LIMIT))
 
 NAMES := $(sort $(basename $(notdir $(wildcard paper_figures/fig_*.py))))
 DATA_NAMES := fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14 fig_4_01 fig_4_02 fig_4_03 fig_4_04 \
-	fig_a_01 fig_a_02 fig_a_03 fig_a_04
+	fig_a_01 fig_a_02 fig_a_03 fig_a_04 fig_a_05
 FORMATS := pdf svg png txt
 DESIGNS := $(addprefix $(BUILD)/,design_delay_free.json design_extended.json design_robust.json)
-TABLES := additive_error f_gamma delay_free extended trade_off interpolation robustness limits_delay_free limits_extended
+TABLES := additive_error f_gamma delay_free extended trade_off interpolation robustness limits_delay_free limits_extended \
+	sampled
 
 IDENTIFICATION := $(wildcard identification/*.py)
 CONTRACT := $(addprefix identification/,files.py plant.py model.py thesis.py) $(THESIS)
-ENGINE := $(addprefix experiments/,__main__.py closed_loop.py taylor.py crossings.py loops.py scenarios.py metrics.py)
+ENGINE := $(addprefix experiments/,__main__.py tables.py closed_loop.py taylor.py crossings.py loops.py scenarios.py metrics.py)
 TRACKING := $(ENGINE) $(addprefix experiments/,tracking.py pade.py)
 
 .PHONY: help figures refit claims test bench study lint clean
@@ -60,7 +62,7 @@ help: ## say what there is
 	@echo 'make refit ... FIT="--modes 1 --bound-order 3"    with options of python -m identification fit'
 	@echo 'make refit ... LIMIT=5    under other saturation limits than the thesis'"'"'s'
 
-figures: $(foreach format,$(FORMATS),$(NAMES:%=$(FIGURES)/%.$(format))) ## draw the thesis's figures and A.1 to A.4 into build/figures
+figures: $(foreach format,$(FORMATS),$(NAMES:%=$(FIGURES)/%.$(format))) ## draw the thesis's figures and A.1 to A.5 into build/figures
 
 refit: ## fit SWEEPS="a.csv b.csv", design, simulate, draw and sum up for that plant into OUT
 	+@$(MAKE) --no-print-directory REFIT=yes BUILD='$(OUT)' MODEL= SWEEPS='$(SWEEPS)' NAMES='$(DATA_NAMES)' \
@@ -72,8 +74,9 @@ claims: $(BUILD)/claims.txt ## recompute the numbers that the thesis prints and 
 test: lint ## check style, types and everything else
 	$(PY) -m pytest -q -n 2 --dist loadfile
 
-bench: $(READY) ## measure speed as ratios against peers
+bench: $(BENCH_READY) ## measure speed as ratios against peers, and the cost of a run (needs a C compiler)
 	$(PY) -m pytest -q -s benchmarks --benchmark-only --benchmark-columns=median,iqr,rounds
+	$(PY) benchmarks/closed_loop_cost.py --output $(BUILD)/bench
 
 study: $(READY) ## fit hundreds of synthetic sets: success, distance from the Cramer-Rao bound, coverage, time
 	$(PY) benchmarks/identification_study.py --sets $(SETS)
@@ -91,6 +94,11 @@ $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -m venv .venv
 	$(PY) -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements.lock
 	$(PY) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --no-index --editable .
+	@touch $@
+
+# What `make bench` needs beyond that.
+$(BENCH_READY): requirements-bench.lock $(READY)
+	$(PY) -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements-bench.lock
 	@touch $@
 
 # Remember what was asked for, so that another MODEL or other SWEEPS rebuild what depends on them.
@@ -180,6 +188,11 @@ $(call tables,limits_extended) &: $(BUILD)/design_extended.json $(LIMITED) | $(R
 	$(call attempt,$(PY) -m experiments limits $< --output $(RESULTS),$(call tables,limits_extended),$<,\
 		$(RESULTS)/limits_extended)
 
+SAMPLED := $(TRACKING) $(addprefix experiments/,sampled_rates.py sampled.py sampled_steps.py sampled_controller.py extended.py)
+$(call tables,sampled) &: $(BUILD)/design_extended.json $(SAMPLED) | $(READY)
+	$(call attempt,$(PY) -m experiments sampled-rates $< $(LIMITS) --output $(RESULTS),$(call tables,sampled),$<,\
+		$(RESULTS)/sampled)
+
 $(BUILD)/claims.csv $(BUILD)/claims.txt &: data/thesis/claims.csv $(wildcard experiments/*.py design/*.py) $(CONTRACT) | $(READY)
 	@mkdir -p $(BUILD)
 	$(PY) -m experiments claims --output $(BUILD) > $(BUILD)/claims.txt
@@ -198,12 +211,13 @@ $(call drawing,fig_a_02): $(RESULTS)/interpolation_map.csv
 $(eval $(call feeds,robustness,fig_a_03))
 $(eval $(call feeds,limits_delay_free,fig_a_04))
 $(eval $(call feeds,limits_extended,fig_a_04))
+$(eval $(call feeds,sampled,fig_a_05))
 
 $(call drawing,fig_2_02 fig_2_03 fig_2_04): $(addprefix paper_figures/,pid.py panels.py captions.py)
 $(call drawing,fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14): $(addprefix paper_figures/,panels.py captions.py)
 $(call drawing,fig_2_10 fig_2_11): paper_figures/f_gamma.py
 $(call drawing,fig_4_01 fig_4_02 fig_4_03 fig_4_04): $(addprefix paper_figures/,extended.py panels.py captions.py)
-$(call drawing,fig_a_01 fig_a_02 fig_a_03 fig_a_04): $(addprefix paper_figures/,panels.py captions.py)
+$(call drawing,fig_a_01 fig_a_02 fig_a_03 fig_a_04 fig_a_05): $(addprefix paper_figures/,panels.py captions.py)
 
 DIAGRAMS := fig_2_01 fig_2_05 fig_2_06 fig_2_07 fig_2_08 fig_3_01 fig_3_02
 $(call drawing,$(DIAGRAMS)): paper_figures/block_diagrams.py

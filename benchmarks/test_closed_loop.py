@@ -1,20 +1,24 @@
-"""The engine against python-control with second-order Pade, and against DOP853 by the method of steps."""
+"""One run of the chapter 4 loop against python-control with Pade, jitcdde, and DOP853 by the method of steps."""
 
 from __future__ import annotations
 
+import gc
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-import control
 import numpy as np
 import pytest
+from peers import SAID_OF_JITCDDE, collapsed_response, jitcdde_run, pade_response
 
 from design.contract import Design
 from design.extended import design_extended
-from experiments.closed_loop import simulate
+from experiments.closed_loop import Run, simulate
 from experiments.loops import design_loop
 from experiments.pade import with_pade
+from experiments.saturated_loop import SaturatedLoop
 from experiments.scenarios import thesis_reference
 from identification.model import read_model
 
@@ -22,6 +26,9 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "unit"))
 from oracle import reference_run
 
 LIMIT = 12.0
+LIMITS = (-LIMIT, LIMIT)
+WHOLE_S = 30.0
+PADE_S = 1.0  # python-control takes seconds for each second
 
 
 @pytest.fixture(scope="module")
@@ -29,29 +36,77 @@ def design() -> Design:
     return design_extended(read_model("implied"), [1.5], 4.0, [(2.0, 1.0)])
 
 
-def test_against_python_control(design: Design, against: Callable[..., object]) -> None:
-    """One second of the loop with the thesis's anti-windup; python-control's error there is 1e-3 and more."""
-    loop = design_loop(design, thesis_reference("extended", [1.5]), design.compensator("thesis"))
-    approximate = with_pade(loop, 2)
-    time_s = np.linspace(0.0, 1.0, 1001)
-
-    def update(_t: float, x: np.ndarray, _u: np.ndarray, _params: object) -> np.ndarray:
-        return approximate.A @ x + approximate.B * np.clip(approximate.C @ x, -LIMIT, LIMIT)
-
-    system = control.nlsys(update, None, inputs=0, outputs=None, states=len(approximate.x0))
-
-    def peer() -> object:
-        return control.input_output_response(system, time_s, X0=approximate.x0, solve_ivp_kwargs={"rtol": 1e-6})
-
-    against(lambda: simulate(loop, (-LIMIT, LIMIT), time_s), peer, rounds=1)
+@pytest.fixture(scope="module")
+def loop(design: Design) -> SaturatedLoop:
+    """The loop with the thesis's anti-windup, from rest."""
+    return design_loop(design, thesis_reference("extended", [1.5]), design.compensator("thesis"))
 
 
-def test_against_dop853_by_steps(design: Design, against: Callable[..., object]) -> None:
-    """Half a second of the same loop, both to 1e-9 and better."""
-    loop = design_loop(design, thesis_reference("extended", [1.5]), design.compensator("thesis"))
+def times(horizon_s: float) -> np.ndarray:
+    """Every millisecond up to the horizon."""
+    return np.linspace(0.0, horizon_s, round(1000 * horizon_s) + 1)
+
+
+def off(values: np.ndarray, exact: np.ndarray) -> float:
+    """The largest difference, as a share of the largest exact value."""
+    return float(np.abs(values - exact).max() / np.abs(exact).max())
+
+
+@pytest.mark.parametrize("horizon_s", [PADE_S, WHOLE_S], ids=lambda horizon: f"{horizon:g}_s")
+def test_ours_alone(benchmark: Any, loop: SaturatedLoop, horizon_s: float) -> None:
+    """Thirty rounds of one run: the spread is the noise of the machine."""
+    time_s = times(horizon_s)
+    simulate(loop, LIMITS, time_s)
+    benchmark.pedantic(lambda: simulate(loop, LIMITS, time_s), rounds=30, iterations=1)
+
+
+@pytest.mark.parametrize("form", ["interconnected", "collapsed"])
+def test_against_python_control(design: Design, loop: SaturatedLoop, against: Callable[..., None], form: str) -> None:
+    """One second with second-order Pade: blocks joined by interconnect, and the whole loop as one function."""
+    time_s = times(PADE_S)
+    pade = simulate(with_pade(loop, 2), LIMITS, time_s).outputs["output"]
+    if form == "interconnected":
+        peer = pade_response(design, LIMIT, time_s, tolerance=1e-6)
+    else:
+        peer = collapsed_response(with_pade(loop, 2), LIMIT, time_s, tolerance=1e-6)
+
+    def error(ours: Run, output: np.ndarray) -> str:
+        exact = ours.outputs["output"]
+        return (
+            f"{PADE_S:g} s, rtol = atol = 1e-6: {off(output, exact):.1e} of y, "
+            f"of which Pade {off(pade, exact):.1e}, its solver {off(output, pade):.1e}"
+        )
+
+    against(lambda: simulate(loop, LIMITS, time_s), peer, rounds=1, error=error)
+
+
+def test_against_jitcdde(loop: SaturatedLoop, against: Callable[..., None]) -> None:
+    """The whole run, a sample every 10 ms; compiling is not in the ratio."""
+    time_s = times(WHOLE_S)[50::10]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        peer, compile_s = jitcdde_run(loop, LIMIT, time_s, tolerance=1e-8)
+
+        def error(ours: Run, delayed: np.ndarray) -> str:
+            return f"{WHOLE_S:g} s, {SAID_OF_JITCDDE}: {off(delayed, exact):.1e} of y; compiled in {compile_s:.2g} s"
+
+        # its states give y ahead of the dead time
+        exact = simulate(loop, LIMITS, time_s + loop.delays[0]).outputs["output"]
+        against(lambda: simulate(loop, LIMITS, time_s), peer, error=error)
+        del peer
+        gc.collect()  # jitcdde leaves its folder to the garbage collector, which warns
+
+
+def test_against_dop853_by_steps(loop: SaturatedLoop, against: Callable[..., None]) -> None:
+    """Half a second at 1e-9."""
     time_s = np.linspace(0.0, 0.5, 51)
+
+    def error(ours: Run, theirs: tuple[np.ndarray, dict[str, np.ndarray]]) -> str:
+        return f"0.5 s, rtol = atol = 1e-9: {off(theirs[0], ours.control):.1e} of u"
+
     against(
-        lambda: simulate(loop, (-LIMIT, LIMIT), time_s),
-        lambda: reference_run(loop, (-LIMIT, LIMIT), time_s, 1e-9),
+        lambda: simulate(loop, LIMITS, time_s),
+        lambda: reference_run(loop, LIMITS, time_s, 1e-9),
         rounds=1,
+        error=error,
     )

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 Real = NDArray[np.float64]
 
@@ -57,6 +56,8 @@ def peak(magnitude: Callable[[Real], Real], roots: Iterable[complex]) -> tuple[f
         The grid's five highest local maxima are refined to the solver's accuracy. The limits omega -> 0 and
         omega -> infinity are taken at the grid's ends, three decades beyond every root.
     """
+    from scipy.optimize import minimize_scalar  # only here: most commands read designs and search no peak
+
     grid = frequency_grid(roots)
     values = magnitude(grid)
     if not np.all(np.isfinite(values)):

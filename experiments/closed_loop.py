@@ -6,62 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from experiments import taylor
+from experiments.compiled_loop import compile_loop
+from experiments.saturated_loop import SaturatedLoop
 from identification.files import InputError
 
 MOST_STEPS = 2e7  # a few minutes
-
-
-@dataclass(frozen=True)
-class Resets:
-    """From outside, the first g states jump: at ``times_s[i]`` they take ``values[i]``.
-
-    Parameters
-    ----------
-    times_s
-        Shape (b,), increasing, positive.
-    values
-        Shape (b, g).
-    """
-
-    times_s: np.ndarray
-    values: np.ndarray
-
-
-NO_RESETS = Resets(np.zeros(0), np.zeros((0, 0)))
-
-
-@dataclass(frozen=True)
-class SaturatedLoop:
-    """x' = A x + B m + D w, u = C x + E w, m = sat(u), w_j(t) = Z_j x(t - delays_j).
-
-    Parameters
-    ----------
-    A, B, C
-        Shapes (n, n), (n,), (n,). The reference is part of the state: it is generated, not sampled.
-    D, E, Z, delays
-        Shapes (n, k), (k,), (k, n), (k,); dead times in seconds, zero allowed. Before t = 0 every delayed
-        signal has the value that it has at t = 0.
-    x0
-        Initial state (n,).
-    outputs
-        Name -> (row over x (n,), row over w (k,)).
-    resets
-        Of a reference that is generated piece by piece.
-    """
-
-    A: np.ndarray
-    B: np.ndarray
-    C: np.ndarray
-    D: np.ndarray
-    E: np.ndarray
-    Z: np.ndarray
-    delays: np.ndarray
-    x0: np.ndarray
-    outputs: Mapping[str, tuple[np.ndarray, np.ndarray]]
-    resets: Resets = NO_RESETS
+TAIL = 1e-11  # of a polynomial's terms, see integrate
 
 
 @dataclass(frozen=True)
@@ -129,77 +81,51 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
     increasing = len(time_s) > 0 and time_s[0] >= 0 and time_s[-1] > 0 and np.all(np.diff(time_s) > 0)
     if not (increasing and np.all(np.isfinite(time_s))):
         raise InputError("the sample times are not increasing finite numbers from zero on that end after zero")
-    loop = _without_zero_delays(loop)
-    n, k = len(loop.x0), len(loop.delays)
-    signals = np.array([np.concatenate([x, [0.0], w]) for x, w in loop.outputs.values()]).reshape(-1, n + 1 + k)
-    read = [np.concatenate([loop.C, [0.0], loop.E]), *np.hstack([loop.Z, np.zeros((k, 1 + k))]), *signals]
-    saturated_rows = _compressed(np.vstack([np.hstack([loop.A, loop.B[:, None], loop.D]), *read]))
-    # what u - sat(u) drives is driven by zeros here, and not by rounding
-    free_A, free_D = loop.A + np.outer(loop.B, loop.C), loop.D + np.outer(loop.B, loop.E)
-    unsaturated_rows = _compressed(np.vstack([np.hstack([free_A, np.zeros((n, 1)), free_D]), *read]))
-    fastest = max(np.abs(np.linalg.eigvals(matrix)).max() for matrix in (loop.A, free_A))
+    compiled, tail = compile_loop(loop), 0.0
     horizon = float(time_s[-1])
-    # three time constants of the fastest mode leave its last term, read REACH steps on, below the tolerance
-    step = 3 / fastest if fastest > 0 else horizon
-    if k:  # a whole number of steps in the shortest dead time: most delayed polynomials are read where they start
-        shortest = float(loop.delays.min())
-        step = shortest / np.ceil(shortest / step)
-    if horizon / step > MOST_STEPS:
+    if horizon / compiled.step > MOST_STEPS:
         raise InputError(
-            f"the run needs {horizon / step:.3g} steps of {step:.3g} s, set by its shortest dead time or fastest pole; "
-            f"expected at most {MOST_STEPS:.3g} (a shorter run, a dead time of zero, or a slower design)"
+            f"the run needs {horizon / compiled.step:.3g} steps of {compiled.step:.3g} s, set by its shortest dead time "
+            f"or fastest pole; expected at most {MOST_STEPS:.3g} (a shorter run, a dead time of zero, or a slower design)"
         )
-    most_events = 4096
-    for _ in range(40):
-        values, events, modes, tail, status, end = taylor.integrate(
-            *unsaturated_rows,
-            *saturated_rows,
-            loop.delays,
-            loop.x0,
+    most_events, room = 4096, 64
+    while True:
+        values, events, modes, status, end, _, tail = taylor.integrate(
+            compiled.unsaturated,
+            compiled.saturated,
+            compiled.ends,
+            compiled.polynomials,
+            compiled.delays,
+            compiled.x0,
+            loop.resets.times_s,
+            loop.resets.values,
             float(low),
             float(high),
             horizon,
-            step,
-            time_s,
+            compiled.step,
+            compiled.margin,
+            time_s - compiled.lags[:, None],
+            compiled.groups,
+            int(MOST_STEPS),
             most_events,
+            room,
         )
         if status == taylor.CROWDED:
-            most_events *= 8
-        elif tail > 1e-11:
-            step /= 2
+            most_events, room = 4 * most_events, 4 * room
+        elif tail > TAIL:
+            compiled = compile_loop(loop, compiled.step / 2)
         else:
             break
     if status == taylor.DIVERGED:
         raise DivergenceError(end)
-    if status != taylor.COMPLETE or tail > 1e-11:
+    if status != taylor.COMPLETE:
         raise InputError(f"the loop could not be integrated: {len(events)} events up to t = {end:.6g} s")
+    outputs = compiled.reading @ values[1:]
     return Run(
         time_s=time_s,
-        control=values[:, 0],
-        saturated_control=np.clip(values[:, 0], low, high),
-        outputs={name: values[:, 1 + k] for k, name in enumerate(loop.outputs)},
+        control=values[0],
+        saturated_control=np.clip(values[0], low, high),
+        outputs=dict(zip(loop.outputs, outputs, strict=True)),
         events_s=events,
         modes=modes,
-    )
-
-
-def _compressed(dense: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Row pointers, columns and values; unsigned, so that no index is tested for a count from the end."""
-    matrix = csr_array(dense)
-    return matrix.indptr.astype(np.uint32), matrix.indices.astype(np.uint32), matrix.data
-
-
-def _without_zero_delays(loop: SaturatedLoop) -> SaturatedLoop:
-    """The same loop with w_j = Z_j x substituted wherever the dead time is zero."""
-    now, later = loop.delays == 0, loop.delays > 0
-    return SaturatedLoop(
-        A=loop.A + loop.D[:, now] @ loop.Z[now],
-        B=loop.B,
-        C=loop.C + loop.E[now] @ loop.Z[now],
-        D=np.ascontiguousarray(loop.D[:, later]),
-        E=np.ascontiguousarray(loop.E[later]),
-        Z=np.ascontiguousarray(loop.Z[later]),
-        delays=loop.delays[later],
-        x0=loop.x0,
-        outputs={name: (x + w[now] @ loop.Z[now], w[later]) for name, (x, w) in loop.outputs.items()},
     )

@@ -9,7 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
-MOST = 40  # degree
+MOST = 60  # degree
+JUMP = 1e-9  # a control that is further than this share beyond a limit has jumped there
 
 
 def _binomials(order: int) -> np.ndarray:
@@ -24,7 +25,7 @@ def _binomials(order: int) -> np.ndarray:
 BINOMIAL = _binomials(MOST)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _sign_changes(b: Array) -> int:
     """Sign changes in a sequence, zeros left out."""
     changes, last = 0, 0
@@ -37,7 +38,7 @@ def _sign_changes(b: Array) -> int:
     return changes
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def first_exit(g: Array, length: float) -> float:
     """The first tau in (0, length] where the polynomial g, positive at the start, becomes negative; -1 if none.
 
@@ -56,11 +57,14 @@ def first_exit(g: Array, length: float) -> float:
     stack = np.empty((64, n + 1))
     left = np.empty(64)
     right = np.empty(64)
+    scaled, power = np.empty(n + 1), 1.0
+    for i in range(n + 1):
+        scaled[i] = g[i] * power / BINOMIAL[n, i]
+        power *= length
     for j in range(n + 1):
-        value, power = 0.0, 1.0
+        value = 0.0
         for i in range(j + 1):
-            value += BINOMIAL[j, i] / BINOMIAL[n, i] * g[i] * power
-            power *= length
+            value += BINOMIAL[j, i] * scaled[i]
         stack[0, j] = value
     left[0], right[0] = 0.0, length
     depth = 1
@@ -94,7 +98,7 @@ def first_exit(g: Array, length: float) -> float:
     return -1.0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _root(g: Array, lo: float, hi: float) -> float:
     """The root of g in [lo, hi], g(lo) >= 0 >= g(hi): Newton kept inside a shrinking bracket."""
     tau = 0.5 * (lo + hi)
@@ -116,11 +120,11 @@ def _root(g: Array, lo: float, hi: float) -> float:
     return tau
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def leave(
     U: Array, degree: int, mode: int, on_limit: int, stuck: bool, low: float, high: float, reach: float
 ) -> tuple[float, int, int]:
-    """Where on (0, reach] a control leaves its mode, the mode that it enters (-1, 0, 1), and the limit that it crosses.
+    """Where on (0, reach] a control leaves its mode, the mode that it enters (-1, 0, 1), and the limit on which it is then.
 
     Parameters
     ----------
@@ -146,7 +150,7 @@ def leave(
     for i in range(1, degree + 1):
         power *= reach
         swing += abs(U[i]) * power
-    if on_limit == 0 and ((mode >= 0 and U[0] - high > swing) or (mode <= 0 and low - U[0] > swing)):
+    if on_limit == 0 and ((mode == 1 and U[0] - high > swing) or (mode == -1 and low - U[0] > swing)):
         return best, entered, crossed
     if on_limit == 0 and mode == 0 and high - U[0] > swing and U[0] - low > swing:
         return best, entered, crossed
@@ -168,5 +172,6 @@ def leave(
                 continue
         found = 0.0 if g[0] < 0 else first_exit(g, reach)
         if found >= 0 and (best < 0 or found < best):
-            best, entered, crossed = found, (side if mode == 0 else 0), side
+            jumped = -g[0] > JUMP * (abs(limit) + abs(U[0]))
+            best, entered, crossed = found, (side if mode == 0 else 0), (0 if jumped else side)
     return best, entered, crossed

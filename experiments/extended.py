@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 
 from design.contract import Design
-from experiments.closed_loop import SaturatedLoop, simulate
+from experiments.closed_loop import simulate
 from experiments.metrics import last_saturation
 from experiments.pade import with_pade
+from experiments.saturated_loop import SaturatedLoop
 from experiments.scenarios import thesis_reference
 from experiments.tracking import loops, run_all, span, tracking_summary, tracking_table
 from identification.files import InputError

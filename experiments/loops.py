@@ -11,7 +11,7 @@ from design.anti_windup import AntiWindup
 from design.block import Block, plant_block
 from design.contract import Design
 from design.realization import StateSpace, realize
-from experiments.closed_loop import SaturatedLoop
+from experiments.saturated_loop import SaturatedLoop
 from experiments.scenarios import Generator, PidBenchmark, Reference, SampledReference
 from identification.files import InputError
 from identification.plant import PlantModel

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
-import control
+from math import comb, factorial
+
 import numpy as np
 from scipy.linalg import block_diag
 
-from experiments.closed_loop import SaturatedLoop
+from design.block import Block
+from design.realization import realize
+from experiments.saturated_loop import SaturatedLoop
+
+
+def pade_block(delay_s: float, order: int) -> Block:
+    """The Pade approximation of exp(-delay_s s), of equal degrees: N(-s)/N(s) for a positive dead time."""
+    # in units of the dead time the coefficients are of order one
+    falling = [comb(order, k) * factorial(2 * order - k) // factorial(order) for k in range(order, -1, -1)]
+    poles = np.roots(falling) / delay_s
+    return Block((-1.0) ** order, tuple(-poles), tuple(poles))
 
 
 def with_pade(loop: SaturatedLoop, order: int) -> SaturatedLoop:
@@ -25,24 +36,17 @@ def with_pade(loop: SaturatedLoop, order: int) -> SaturatedLoop:
         Without dead times; the approximations' states follow the loop's own.
     """
     n = len(loop.x0)
-    filters = []
-    for delay in loop.delays:
-        # in units of the dead time the coefficients are of order one
-        numerator, denominator = control.pade(1.0, order)
-        unit = control.ss(control.tf(numerator, denominator))
-        filters.append((unit.A / (delay or 1.0), unit.B[:, 0] / (delay or 1.0), unit.C[0], unit.D[0, 0], delay))
-    late = [k for k, delay in enumerate(loop.delays) if delay > 0]
-    extra = order * len(late)
-    A = block_diag(loop.A, *(filters[k][0] for k in late))
+    filters = {k: realize(pade_block(delay, order)) for k, delay in enumerate(loop.delays) if delay > 0}
+    extra = order * len(filters)
+    A = block_diag(loop.A, *(part.A for part in filters.values()))
     Z = np.hstack([loop.Z, np.zeros((len(loop.delays), extra))])
     # w_k = row_k x for the extended state
     rows = Z.copy()
-    for position, k in enumerate(late):
+    for position, (k, part) in enumerate(filters.items()):
         place = slice(n + position * order, n + (position + 1) * order)
-        _, b, c, d, _ = filters[k]
-        A[place, :n] = np.outer(b, loop.Z[k])
-        rows[k] *= d
-        rows[k, place] = c
+        A[place, :n] = np.outer(part.b, loop.Z[k])
+        rows[k] *= part.d[0]
+        rows[k, place] = part.C[0]
     pad = np.zeros(extra)
     A[:n] += loop.D @ rows
     return SaturatedLoop(

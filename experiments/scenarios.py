@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from experiments.closed_loop import NO_RESETS, Resets
+from experiments.saturated_loop import NO_RESETS, Resets
 from identification.files import InputError
 from identification.plant import PlantModel
 from identification.thesis import printed

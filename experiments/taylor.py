@@ -3,7 +3,8 @@
     x'(t) = A x + B m + D w        u = C x + E w        m = sat(u)        w_j(t) = Z_j x(t - h_j)
 
 Between events the loop is linear, so that on a step every signal is a polynomial in tau = (t - t_k)/step up to
-rounding: x_{i+1} = step/(i+1) (A x_i + B m_i + D w_i), the delayed signals w being earlier polynomials shifted.
+rounding, the delayed signals w being earlier polynomials shifted. A whole step is one product with a table, see
+:mod:`experiments.propagator`; a step that a mesh point or an event cuts short is summed term by term.
 """
 
 from __future__ import annotations
@@ -14,244 +15,299 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from experiments.crossings import leave
+from experiments.crossings import BINOMIAL, leave
+from experiments.propagator import LANES, Rows, dot, times
 
 Array = NDArray[Any]
 
-ORDER = 40  # of a series at most; it ends where two terms in a row are negligible
-NEGLIGIBLE = 1e-13  # a term, relative to the largest value of its state so far
-GENERATIONS = 12  # a kink's image after this many dead times is smooth to the order of the series
-REACH = 1.5  # a polynomial is read up to this many steps from where it starts
+NEGLIGIBLE = 1e-14  # a term, or a kink, relative to the largest value of its signal so far
+NOTHING = 1e-30  # what is smaller than this share of the largest value of its signal so far is zero
+DIVERGENT = 1e100  # a loop whose state passes this diverges
 
-MOST = 1e100  # a loop whose state passes this diverges
-
-COMPLETE, DIVERGED, CROWDED = 0, 1, 2
+COMPLETE, DIVERGED, ENDLESS, CROWDED = 0, 1, 2, 3
 
 
-@njit(cache=True)
-def _horner(c: Array, degree: int, tau: float) -> float:
-    """sum c_i tau^i."""
-    value = 0.0
-    for i in range(degree, -1, -1):
-        value = value * tau + c[i]
-    return value
-
-
-@njit(cache=True)
-def _row(indptr: Array, indices: Array, data: Array, row: int, v: Array) -> float:
-    """A row of a sparse matrix times v."""
-    value = 0.0
-    for q in range(indptr[row], indptr[row + 1]):
-        value += data[q] * v[indices[q]]
-    return value
-
-
-@njit(cache=True)
-def _insert(times: Array, generations: Array, count: int, t: float, generation: int) -> tuple[Array, Array, int]:
-    """Insert a future mesh point into the sorted queue, unless one is there already."""
-    for k in range(count):
-        if abs(times[k] - t) <= 1e-13 * (1.0 + abs(t)):
-            generations[k] = min(generations[k], generation)
-            return times, generations, count
-    if count == len(times):
-        grown, grown_generations = np.empty(2 * count), np.empty(2 * count, np.int64)
-        grown[:count], grown_generations[:count] = times, generations
-        times, generations = grown, grown_generations
-    k = count
-    while k > 0 and times[k - 1] > t:
-        times[k], generations[k] = times[k - 1], generations[k - 1]
-        k -= 1
-    times[k], generations[k] = t, generation
-    return times, generations, count + 1
-
-
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _shift(c: Array, degree: int, delta: float) -> None:
-    """Replace the coefficients of p(tau) by those of p(tau + delta), by repeated synthetic division."""
+    """Replace the coefficients of p(tau) by those of p(tau + delta)."""
+    power = np.empty(degree + 1)
+    power[0] = 1.0
     for i in range(degree):
-        for m in range(degree - 1, i - 1, -1):
-            c[m] += delta * c[m + 1]
+        power[i + 1] = power[i] * delta
+    for m in range(degree + 1):
+        value = 0.0
+        for i in range(m, degree + 1):
+            value += BINOMIAL[i, m] * power[i - m] * c[i]
+        c[m] = value
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
+def _insert(queue: Array, queued: int, t: float) -> int:
+    """Insert a time into the sorted queue, unless it is there already, to rounding; its new length."""
+    k = queued
+    while k > 0 and queue[k - 1] > t:
+        k -= 1
+    near = 1e-13 * (1.0 + abs(t))
+    if (k > 0 and t - queue[k - 1] <= near) or (k < queued and queue[k] - t <= near):
+        return queued
+    for q in range(queued, k, -1):
+        queue[q] = queue[q - 1]
+    queue[k] = t
+    return queued + 1
+
+
+@njit(cache=True, nogil=True)
 def _series(
-    indptr: Array, indices: Array, data: Array, V: Array, U: Array, n: int, known: int, scale: Array, step: float,
-    level: float,
-) -> int:  # fmt: skip
-    """Fill V[1:, :n + 1] and U (ORDER + 1,) and return the degree.
+    rows: Rows, V: Array, n: int, known: int, most: int, scale: Array, step: float, reach: float, x: Array
+) -> None:
+    """x at tau = reach, term by term.
 
-    V (ORDER + 1, n + 1 + k) holds the terms of (x, m, w), V[0, :n] and the delayed signals to the degree ``known``
-    are given, m is constant; the first n rows of the sparse matrix make x', the next one u.
+    V (most + 1, n + 1 + k) holds the terms of (x, m, w): V[0] and the delayed signals, to the degree ``known``, are
+    given. The sum ends where a term is negligible against ``scale``, or after ``most``.
     """
-    negligible, power = False, 1.0
-    for i in range(ORDER + 1):
-        now = V[i]
-        U[i] = _row(indptr, indices, data, n, now)
-        now[n] = level if i == 0 else 0.0
-        if i == ORDER:
-            break
+    indptr, indices, data = rows
+    power = 1.0
+    for r in range(n):
+        x[r] = V[0, r]
+    for i in range(most):
         factor = step / (i + 1)
-        power *= REACH
-        before, negligible = negligible, i + 1 > known
-        following = V[i + 1]
+        power *= reach
+        negligible = i >= known
         for r in range(n):
-            term = 0.0
-            for q in range(indptr[r], indptr[r + 1]):
-                term += data[q] * now[indices[q]]
-            term *= factor
-            following[r] = term
-            if negligible and abs(term) * power > NEGLIGIBLE * scale[r]:
+            term = factor * times(indptr, indices, data, r, V, i)
+            V[i + 1, r] = term
+            term *= power
+            x[r] += term
+            if negligible and abs(term) > NEGLIGIBLE * scale[r]:
                 negligible = False
-        if before and negligible:
-            U[i + 1] = _row(indptr, indices, data, n, following)
-            return i + 1
-    return ORDER
+        if negligible:
+            break
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
+def _polynomial(
+    polynomials: Array, which: int, signal: int, signals: int, z: Array, columns: int, known: int, most: int,
+    size: Array, at: int, c: Array,
+) -> int:  # fmt: skip
+    """Fill c with a signal's coefficients until they are negligible against its ``size[at]`` so far; the degree."""
+    quiet = 0
+    for degree in range(most + 1):
+        c[degree] = dot(polynomials, which, signals * degree + signal, z, columns)
+        size[at] = max(size[at], abs(c[degree]))
+        quiet = quiet + 1 if degree > known and abs(c[degree]) <= NEGLIGIBLE * size[at] else 0
+        if quiet == 2:
+            return degree
+    return most
+
+
+@njit(cache=True, nogil=True)
 def integrate(
-    indptr: Array, indices: Array, data: Array, indptr_m: Array, indices_m: Array, data_m: Array, delays: Array,
-    x0: Array, low: float, high: float, horizon: float, step: float, samples: Array, most_events: int,
-) -> tuple[Array, Array, Array, float, int, float]:  # fmt: skip
+    unsaturated: Rows, saturated: Rows, ends: Array, polynomials: Array, delays: Array, x0: Array, reset_times: Array,
+    resets: Array, low: float, high: float, horizon: float, step: float, margin: float, samples: Array,
+    groups: Array, most_steps: int, most_events: int, room: int,
+) -> tuple[Array, Array, Array, int, float, int, float]:  # fmt: skip
     """Integrate one loop from rest of its delayed signals, w_j(t < 0) = Z_j x0.
 
     Parameters
     ----------
-    indptr, indices, data
-        A matrix in compressed rows over (x (n,), m, w (k,)): n rows [A + B C, 0, D + B E], the loop without saturation,
-        a row [C 0 E], k rows [Z 0 0], and a row for each signal to sample besides u.
-    indptr_m, indices_m, data_m
-        The same with n rows [A B D]: the saturated loop.
+    unsaturated
+        Over (x (n,), m, w (k,)): n rows [A + B C, 0, D + B E], the loop without saturation, a row [C 0 E], k rows
+        [Z 0 0], and o rows [. 0 0] of what is watched.
+    saturated
+        The same with n rows [A B D].
+    ends, polynomials
+        Tables of the two, see :func:`experiments.propagator.tabulate`: shapes (2, n, c), (2, (1 + k + o)(d + 1), c).
     delays, x0
         Shapes (k,), (n,); delays positive.
+    reset_times, resets
+        Shapes (b,), (b, g): times at which the first g states take given values.
     low, high
         Saturation limits, may be infinite.
     horizon, step
-        End time and nominal step in seconds, step <= min(delays).
-    samples
-        Sorted times (s,) in [0, horizon].
-    most_events
-        Capacity for events.
+        End time and the tables' step in seconds, step <= min(delays).
+    margin
+        How many steps a polynomial is read from where it starts, >= 1; more than 1 spares steps where the images of
+        one mesh under different dead times interleave.
+    samples, groups
+        Shapes (g, s), (g + 1,): groups[i] ... groups[i + 1] - 1 of what is watched is sampled at the sorted times
+        samples[i] <= horizon; before zero it is as at zero. u is sampled with the first group.
+    most_steps, most_events, room
+        Where to give up; ``room``, a power of two, is for the steps and mesh points that a dead time remembers.
 
     Returns
     -------
-    values (s, 1 + m), events (e,), modes (e,), tail, status, end
-        u and the outputs at the samples; event times with the mode entered (-1, 0, 1); the largest that the last
-        term of a series of full order was, as a share of the largest that its state was in the whole run (a state that
-        starts from zero has only high terms at first); COMPLETE, DIVERGED or CROWDED; the time reached.
+    values (1 + o, s), events (e,), modes (e,), status, end, steps, tail
+        u and what is watched at the samples; event times with the mode entered (-1, 0, 1); COMPLETE, DIVERGED,
+        ENDLESS (too many steps) or CROWDED (too many events, or too little room); the time reached; the number of steps;
+        the largest last term of a signal's polynomial, as a share of the largest that the signal was.
     """
     n, k = len(x0), len(delays)
-    outputs = len(indptr) - 2 - n - k
-    values = np.zeros((len(samples), 1 + outputs))
+    indptr, indices, data = unsaturated
+    signals = len(indptr) - 1 - n
+    most = polynomials.shape[1] // signals - 1
+    values, sample = np.zeros((signals - k, samples.shape[1])), np.zeros(len(samples), np.int64)
     events, modes, event_count = np.empty(most_events), np.empty(most_events, np.int64), 0
 
-    # the delayed signals' sources, one polynomial a step, and where each dead time reads
-    starts, degrees, pieces = np.empty(1024), np.empty(1024, np.int64), 0
-    history = np.empty((1024, k, ORDER + 1))
+    # the sources of the delayed signals, one polynomial a step, the step p at p % room, and where each dead time reads
+    starts, degrees, pieces = np.empty(room), np.empty(room, np.int64), 0
+    history = np.empty((room, k, most + 1))
+    wrap = room - 1
     cursor, filled = np.zeros(k, np.int64), np.zeros(k, np.int64)
-    longest = np.max(delays) if k > 0 else 0.0
+    queue, queued = np.empty(room), 0  # mesh points to come: the images of kinks
 
-    # mesh points to come: images of kinks
-    queue, generation, queued = np.empty(64), np.empty(64, np.int64), 0
-    for j in range(k):
-        queue, generation, queued = _insert(queue, generation, queued, delays[j], 1)
-
-    V, U = np.zeros((ORDER + 1, n + 1 + k)), np.zeros(ORDER + 1)
+    z, P, W = np.zeros(ends.shape[2]), np.zeros((1 + k, most + 1)), np.zeros(most + 1)
+    U, V = P[0], np.zeros((most + 1, n + 1 + k))
     V[0, :n] = x0
-    rest = np.array([_row(indptr, indices, data, n + 1 + j, V[0]) for j in range(k)])
+    rest = np.array([times(indptr, indices, data, n + 1 + j, V, 0) for j in range(k)])
     V[0, n + 1 :] = rest
-    x, scale, last = x0.copy(), np.abs(x0), np.zeros(n)
-    size, W, Y = np.abs(rest), np.zeros(ORDER + 1), np.zeros(ORDER + 1)
-    u = _row(indptr, indices, data, n, V[0])
+    x, scale, size = x0.copy(), np.abs(x0), np.zeros(1 + k)
+    size[1:] = np.abs(rest)
+    last = np.zeros(1 + k)
+    seen = np.zeros(signals - 1 - k)  # of what is watched
+    u = times(indptr, indices, data, n, V, 0)
     mode = 1 if u > high else (-1 if u < low else 0)
-    on_limit, standing = 0, 0
-    t, sample, status = 0.0, 0, COMPLETE
+    kink, on_limit, standing = True, 0, 0
+    for g in range(len(samples)):
+        while sample[g] < samples.shape[1] and samples[g, sample[g]] < 0:
+            for o in range(groups[g], groups[g + 1]):
+                values[1 + o, sample[g]] = times(indptr, indices, data, n + 1 + k + o, V, 0)
+            sample[g] += 1
+    t, reset, status, steps = 0.0, 0, COMPLETE, 0
 
     while t < horizon:
+        if steps == most_steps:
+            status = ENDLESS
+            break
+        steps += 1
         t_next = min(t + step, horizon)
         if queued > 0 and queue[0] - t < step * (1 + 1e-9):
             t_next = min(queue[0], horizon)
-        reach = (t_next - t) / step
+        if reset < len(reset_times) and reset_times[reset] < t_next:
+            t_next = reset_times[reset]
 
         known = 0
         for j in range(k):
             for i in range(filled[j] + 1):
-                V[i, n + 1 + j] = 0.0
+                z[n + 1 + k * i + j] = 0.0
             filled[j] = 0
             start = t - delays[j]
             middle = start + 0.5 * (t_next - t)  # decides the piece: the ends may lie on a kink
             if middle < 0:
-                V[0, n + 1 + j] = rest[j]
+                z[n + 1 + j] = rest[j]
                 continue
-            while cursor[j] + 1 < pieces and starts[cursor[j] + 1] <= middle:
+            while cursor[j] + 1 < pieces and starts[(cursor[j] + 1) & wrap] <= middle:
                 cursor[j] += 1
-            piece = cursor[j]
+            piece = cursor[j] & wrap
+            if starts[piece] + margin * step + delays[j] < t_next - 1e-9 * step:
+                t_next = starts[piece] + margin * step + delays[j]
             degree = degrees[piece]
             for i in range(degree + 1):
                 W[i] = history[piece, j, i]
             moved = start - starts[piece]
             if abs(moved) > 4e-16 * (1.0 + t):  # else the same time, to rounding
                 _shift(W, degree, moved / step)
-            power = REACH**degree
-            while degree > 0 and abs(W[degree]) * power <= NEGLIGIBLE * size[j]:
+            power = margin**degree
+            while degree > 0 and abs(W[degree]) * power <= NEGLIGIBLE * size[1 + j]:
                 degree -= 1
-                power /= REACH
+                power /= margin
             for i in range(degree + 1):
-                V[i, n + 1 + j] = W[i]
+                z[n + 1 + k * i + j] = W[i]
             known, filled[j] = max(known, degree), degree
 
-        V[0, :n] = x
-        if mode == 0:
-            degree = _series(indptr, indices, data, V, U, n, known, scale, step, 0.0)
-        else:
-            level = high if mode == 1 else low
-            degree = _series(indptr_m, indices_m, data_m, V, U, n, known, scale, step, level)
+        which = 0 if mode == 0 else 1
+        for r in range(n):
+            z[r] = x[r]
+        z[n] = 0.0 if mode == 0 else (high if mode == 1 else low)
+        columns = -(-(n + 1 + k * (known + 1)) // LANES) * LANES
+        quiet, power = 0, 1.0
+        for degree in range(most + 1):
+            small = degree > known
+            for s in range(1 + k):
+                c = dot(polynomials, which, signals * degree + s, z, columns)
+                size[s] = max(size[s], abs(c)) if degree == 0 else size[s]
+                P[s, degree] = c if abs(c) > NOTHING * size[s] else 0.0
+                small = small and abs(c) * power <= NEGLIGIBLE * size[s]
+            power *= margin
+            quiet = quiet + 1 if small else 0
+            if quiet == 2:
+                break
+        if quiet == 0:
+            for s in range(1 + k):
+                last[s] = max(last[s], abs(P[s, most]) * power)
+
+        whole = abs(t_next - t - step) <= 1e-15 * (1.0 + t)
+        reach = 1.0 if whole else (t_next - t) / step
         exit_at, entered, crossed = leave(U, degree, mode, on_limit, standing > 2, low, high, reach)
         if exit_at >= 0:
             reach = exit_at
             t_next = t + exit_at * step
 
         if reach > 0 and k > 0:
-            if pieces == len(starts):  # forget what no dead time reaches any more, or make room
-                first = 0
-                while first + 1 < pieces and starts[first + 1] < t - longest - step:
-                    first += 1
-                room = len(starts) if first > pieces // 2 else 2 * len(starts)
-                kept, kept_degrees = np.empty(room), np.empty(room, np.int64)
-                kept_history = np.empty((room, k, ORDER + 1))
-                kept[: pieces - first], kept_degrees[: pieces - first] = starts[first:pieces], degrees[first:pieces]
-                kept_history[: pieces - first] = history[first:pieces]
-                starts, degrees, history, pieces = kept, kept_degrees, kept_history, pieces - first
-                cursor -= first
-            starts[pieces], degrees[pieces] = t, degree
+            piece = pieces & wrap
+            if pieces - cursor.min() >= room or queued + k > room:
+                status = CROWDED
+                break
+            starts[piece], degrees[piece] = t, degree
             for j in range(k):
                 for i in range(degree + 1):
-                    history[pieces, j, i] = _row(indptr, indices, data, n + 1 + j, V[i])
-                size[j] = max(size[j], abs(history[pieces, j, 0]))
+                    history[piece, j, i] = P[1 + j, i]
+            if kink:  # its images are mesh points, unless the two sides agree as far as they are read
+                for j in range(k):
+                    W[:] = 0.0
+                    both = degree
+                    if pieces == 0:
+                        W[0] = rest[j]
+                    else:
+                        left = (pieces - 1) & wrap
+                        before = degrees[left]
+                        for i in range(before + 1):
+                            W[i] = history[left, j, i]
+                        _shift(W, before, (t - starts[left]) / step)
+                        both = max(before, degree)
+                    gap, power = 0.0, 1.0
+                    for i in range(both + 1):
+                        gap += abs(W[i] - (P[1 + j, i] if i <= degree else 0.0)) * power
+                        power *= 0.5
+                    if gap > NEGLIGIBLE * size[1 + j]:
+                        queued = _insert(queue, queued, t + delays[j])
+                kink = False
             pieces += 1
 
-        if sample < len(samples) and (samples[sample] < t_next or t_next >= horizon):
-            until = sample
-            while until < len(samples) and (samples[until] < t_next or t_next >= horizon):
-                values[until, 0] = _horner(U, degree, (samples[until] - t) / step)
+        for g in range(len(samples)):
+            begin = until = sample[g]
+            while until < samples.shape[1] and (samples[g, until] < t_next or t_next >= horizon):
                 until += 1
-            for row in range(outputs):
-                for i in range(degree + 1):
-                    Y[i] = _row(indptr, indices, data, n + 1 + k + row, V[i])
-                for at in range(sample, until):
-                    values[at, 1 + row] = _horner(Y, degree, (samples[at] - t) / step)
-            sample = until
+            if until == begin:
+                continue
+            sample[g] = until
+            for o in range(-1 if g == 0 else groups[g], groups[g + 1]):
+                upto = degree
+                if o < 0:
+                    for i in range(degree + 1):
+                        W[i] = U[i]
+                else:
+                    upto = _polynomial(polynomials, which, 1 + k + o, signals, z, columns, known, most, seen, o, W)
+                for at in range(begin, until):
+                    tau, value = (samples[g, at] - t) / step, 0.0
+                    for i in range(upto, -1, -1):
+                        value = value * tau + W[i]
+                    values[1 + o, at] = value
 
-        for r in range(n):
-            x[r] = V[degree, r]
-        for i in range(degree - 1, -1, -1):
+        if reach == 1.0:
             for r in range(n):
-                x[r] = x[r] * reach + V[i, r]
+                x[r] = dot(ends, which, r, z, columns)
+        elif reach > 0:
+            for i in range(known + 1):
+                for j in range(k):
+                    V[i, n + 1 + j] = z[n + 1 + k * i + j]
+            V[0, : n + 1] = z[: n + 1]
+            _series(unsaturated if mode == 0 else saturated, V, n, known, most, scale, step, reach, x)
+            V[: known + 1, n + 1 :] = 0.0
         for r in range(n):
             scale[r] = max(scale[r], abs(x[r]))
-            if degree == ORDER:
-                last[r] = max(last[r], abs(V[ORDER, r]) * REACH**ORDER)
-            if not abs(x[r]) < MOST:
+            if abs(x[r]) < NOTHING * scale[r]:  # lest it decay to numbers that the processor is slow with
+                x[r] = 0.0
+            if not abs(x[r]) < DIVERGENT:
                 status = DIVERGED
         standing = standing + 1 if reach == 0 else 0
         t = t_next
@@ -263,21 +319,21 @@ def integrate(
             if event_count == most_events:
                 status = CROWDED
                 break
-            mode = entered
+            mode, kink = entered, True
             events[event_count], modes[event_count] = t, mode
             event_count += 1
-            for j in range(k):
-                queue, generation, queued = _insert(queue, generation, queued, t + delays[j], 1)
-        while queued > 0 and queue[0] <= t + 1e-13 * (1.0 + t):
-            reached, depth = queue[0], generation[0]
-            queue[: queued - 1] = queue[1:queued].copy()
-            generation[: queued - 1] = generation[1:queued].copy()
-            queued -= 1
-            if depth < GENERATIONS:
-                for j in range(k):
-                    queue, generation, queued = _insert(queue, generation, queued, reached + delays[j], depth + 1)
+        elif reset < len(reset_times) and t == reset_times[reset]:
+            x[: resets.shape[1]] = resets[reset]
+            reset, kink = reset + 1, True
+        passed = 0
+        while passed < queued and queue[passed] <= t + 1e-13 * (1.0 + t):
+            passed, kink = passed + 1, True
+        if passed > 0:
+            queued -= passed
+            for q in range(queued):
+                queue[q] = queue[q + passed]
     tail = 0.0
-    for r in range(n):
-        if scale[r] > 0:
-            tail = max(tail, last[r] / scale[r])
-    return values, events[:event_count], modes[:event_count], tail, status, t
+    for s in range(1 + k):
+        if size[s] > 0:
+            tail = max(tail, last[s] / size[s])
+    return values, events[:event_count], modes[:event_count], status, t, steps, tail

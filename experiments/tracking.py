@@ -10,9 +10,10 @@ import pandas as pd
 
 from design.anti_windup import AntiWindup
 from design.contract import Design
-from experiments.closed_loop import DivergenceError, Run, SaturatedLoop, simulate
+from experiments.closed_loop import DivergenceError, Run, simulate
 from experiments.loops import design_loop
 from experiments.metrics import last_saturation, over_last, settling_time
+from experiments.saturated_loop import SaturatedLoop
 from experiments.scenarios import Reference
 from identification.model import number
 

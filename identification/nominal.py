@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import chdtrc, ndtri, stdtrit
 
 from identification.files import InputError
 from identification.likelihood import maximise_together
@@ -76,10 +76,10 @@ class Nominal:
     @property
     def half_widths(self) -> Real:
         """(p,) of the 95 % intervals of theta; of the scatter by Student's distribution."""
-        normal = stats.norm.ppf((1 + CONFIDENCE) / 2)
+        normal = ndtri((1 + CONFIDENCE) / 2)
         random = normal * self.noise
         if self.scatter is not None and self.scattered:
-            student = stats.t.ppf((1 + CONFIDENCE) / 2, self.count - 1)
+            student = stdtrit(self.count - 1, (1 + CONFIDENCE) / 2)
             random = np.maximum(random, student * self.scatter)
         return np.minimum(np.hypot(random, normal * self.misfit), WIDEST)
 
@@ -139,9 +139,9 @@ def nominal_of(tests: Sequence[ScaledTest], fits: Sequence[OneFit]) -> Nominal:
     if count > 1:
         scatter = thetas.std(axis=0, ddof=1) / np.sqrt(count)
         one, increase = _together(tests, fits)
-        together = stats.chi2.sf(increase, theta.size * (count - 1))
+        together = chdtrc(theta.size * (count - 1), increase)
         mean = np.average(thetas, axis=0, weights=1 / variances)
-        alone = stats.chi2.sf(np.sum((thetas - mean) ** 2 / variances, axis=0), count - 1)
+        alone = chdtrc(count - 1, np.sum((thetas - mean) ** 2 / variances, axis=0))
         agreement = float(min(1.0, 2 * together, 2 * theta.size * alone.min()))
         if agreement >= ONE_PLANT:
             theta = one

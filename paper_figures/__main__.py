@@ -16,14 +16,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 import paper_figures
-from design.contract import read_design
-from identification.discretised import alias_free
 from identification.files import CommandGroup, InputError, read_text
-from identification.frequency_response import read_sweeps
-from identification.model import read_model
-from paper_figures import style, summary_page
-from paper_figures.summary import summarise
-from paper_figures.summary_of_designs import FOLLOWING
+from paper_figures import style
 
 Result = TypeVar("Result")
 
@@ -78,6 +72,15 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
 )
 def summary_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
     """Sum up MODEL, fitted to SWEEP files, its designs, and what was refused: summary.pdf, .svg, .png and .txt."""
+    # only here: they take a second to import, and no figure needs them
+    from design.contract import read_design
+    from identification.discretised import alias_free
+    from identification.frequency_response import read_sweeps
+    from identification.model import read_model
+    from paper_figures import summary_page
+    from paper_figures.summary import summarise
+    from paper_figures.summary_of_designs import FOLLOWING
+
     identified = read_model(model)
     tests = [alias_free(test, identified.plant) for test in read_sweeps(sweeps)]
     designs = read_attempts({name: build / f"design_{name}" for name in FOLLOWING}, ".json", read_design)

@@ -24,12 +24,13 @@ FIGURES = {
     "robustness": "A.3",
     "limits_delay_free": "A.4",
     "limits_extended": "A.4",
+    "sampled": "A.5",
 }
 """What is drawn of each experiment that needs a design."""
 
 FOLLOWING = {
     "delay_free": ("delay_free", "limits_delay_free"),
-    "extended": ("f_gamma", "extended", "trade_off", "interpolation", "limits_extended"),
+    "extended": ("f_gamma", "extended", "trade_off", "interpolation", "limits_extended", "sampled"),
     "robust": ("robustness",),
 }
 """The experiments that need each design."""

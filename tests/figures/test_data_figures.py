@@ -16,7 +16,7 @@ from matplotlib.text import Text
 
 from identification.files import InputError
 from paper_figures import __main__ as command_line
-from paper_figures import captions, fig_2_12, panels, style
+from paper_figures import captions, fig_2_12, fig_a_05, panels, style
 from paper_figures.__main__ import figure_module
 
 Tables = dict[str, pd.DataFrame]
@@ -96,8 +96,24 @@ def limits_tables() -> Tables:
     return tables
 
 
+def sampled_tables() -> Tables:
+    time_s = np.linspace(0, 24, 481)
+    columns, rows = {"time_s": time_s}, []
+    for k, (run, least) in enumerate((("none", 0.0), ("thesis", 17.25), ("corrected", 0.0)), start=1):
+        columns[f"error_{run}"] = least + 50 * np.exp(-time_s / k) * np.cos(4 * time_s)
+        columns[f"error_{run}_drive"] = columns[f"error_{run}"] + 0.002 * np.sin(9 * time_s)
+        rows.append((run, "continuous", np.nan, least + 1e-5, 2.25 * k))
+        for order, method in ((1, "exact"), (2, "tustin")):
+            rows += [(run, method, f, least + (40 / f) ** order, 2.5 * k) for f in (320.0, 1280.0, 5120.0)]
+    facts = {"limit": 13.5, "quantum": 27 / 4096, "full_range_s": 0.0125, "root": 2 * np.pi * 160.0}
+    facts |= {"shown_hz": 1280.0, "period_s": 4.25}
+    summary = pd.DataFrame(rows, columns=["run", "method", "rate_hz", "steady_error", "settling_s"])
+    return {"sampled": pd.DataFrame(columns), "sampled_summary": summary.assign(**facts)}
+
+
 TABLES = {
     "limits_extended": limits_tables,
+    "sampled": sampled_tables,
     "pid": pid_tables,
     "additive_error": additive_error_tables,
     "f_gamma": f_gamma_tables,
@@ -146,7 +162,7 @@ PANELS = {
         signals(signal, run) for run in ("thesis", "corrected") for signal in ("control", "saturated", "control")
     ],
 }
-NAMES = [*PANELS, "fig_2_09", "fig_2_10", "fig_2_11", "fig_a_04"]
+NAMES = [*PANELS, "fig_2_09", "fig_2_10", "fig_2_11", "fig_a_04", "fig_a_05"]
 CONTROL_PANELS = [
     *(("fig_2_02", 1, "swapped_none"), ("fig_2_03", 3, "printed_back_calculation")),
     *(("fig_2_13", 0, "thesis"), ("fig_2_13", 1, "corrected"), ("fig_4_04", 2, "thesis"), ("fig_4_04", 5, "corrected")),
@@ -334,6 +350,7 @@ SAID = {
     "fig_4_03": ["limit", "last_saturation_s", "offset", "settling_s"],
     "fig_4_04": ["limit", "last_saturation_s"],
     "fig_a_04": ["limit"],
+    "fig_a_05": ["limit", "quantum", "full_range_s", "root", "period_s", "steady_error", "settling_s"],
 }
 
 
@@ -427,6 +444,66 @@ def test_floor_stays_legible_beside_a_run_that_diverges(gone, saved):
     for panel, most in zip(lettered(figure), (5.0, 5.0), strict=True):
         assert 1e-3 < panel.get_ylim()[0] < most < panel.get_ylim()[1] < 1100.0
     saved(figure, "fig_a_04", module.caption(tables))
+
+
+def of_kind(panel: Axes, kind: str) -> list[tuple[np.ndarray, np.ndarray]]:
+    """x and y of the lines that have the colour of an entry of style.LINES."""
+    return [line.get_data() for line in panel.lines if line.get_color() == style.LINES[kind]["color"]]
+
+
+def test_the_real_drive():
+    tables = sampled_tables()
+    table, summary = tables["sampled"], tables["sampled_summary"]
+    over_time, over_rate = fig_a_05.draw(tables).axes
+    for run in fig_a_05.RUNS:
+        (tail,) = (y for _, y in of_kind(over_time, run.kind) if len(y))
+        errors = np.abs(table[f"error_{run.name}_drive"].to_numpy())
+        np.testing.assert_array_equal(tail, [errors[k:].max() for k in range(len(errors))])
+        pale = panels.band(style.LINES[run.kind])["color"]
+        (broad,) = (line for line in over_time.lines if line.get_color() == pale)
+        errors = np.abs(table[f"error_{run.name}"].to_numpy())
+        np.testing.assert_array_equal(broad.get_ydata(), [errors[k:].max() for k in range(len(errors))])
+        for (x, y), method in zip(of_kind(over_rate, run.kind), ("tustin", "exact"), strict=True):
+            rows = summary[(summary["run"] == run.name) & (summary["method"] == method)]
+            np.testing.assert_array_equal(x, rows["rate_hz"])
+            np.testing.assert_array_equal(y, rows["steady_error"])
+        (broad,) = (line for line in over_rate.lines if line.get_color() == pale)
+        rows = summary[(summary["run"] == run.name) & (summary["method"] == "continuous")]
+        assert set(broad.get_ydata()) == set(rows["steady_error"])
+    assert over_time.get_ylim() == over_rate.get_ylim()
+    assert over_time.get_ylim()[0] < (40 / 5120) ** 2
+    assert over_time.get_xlim() == (0.0, 24 - 4.25)
+    caption = fig_a_05.caption(tables)
+    for said in (
+        "the limits +-13.5, 4096 steps of 0.0066 between them, 12.5 ms to go from one to the other",
+        "with the drive at 1.28 kHz",
+        "settles in 6.75 s in continuous time and settles in 7.5 s with the drive",
+        "the last period (4.25 s)",
+        "2 to 32 samples in a period of the controller's fastest root, 1.01e+03 rad/s",
+        "at 0.32 kHz and 5.12 kHz is 0.125 and 0.00781 with held inputs, 0.0156 and 6.1e-05 with Tustin's rule",
+        "17.3 in continuous time, stays.",
+    ):
+        assert said in caption
+    assert "diverges" not in caption
+
+
+def test_a_drive_that_diverges_is_named(saved):
+    tables = sampled_tables()
+    summary = tables["sampled_summary"]
+    gone = (summary["run"] == "thesis") & (summary["rate_hz"] == 320)
+    summary.loc[gone, ["steady_error", "settling_s"]] = np.nan
+    caption = fig_a_05.caption(tables)
+    assert "it diverges: thesis, held inputs, 0.32 kHz; thesis, Tustin's rule, 0.32 kHz." in caption
+    assert len(saved(fig_a_05.draw(tables), "fig_a_05", caption)) == 4
+    summary.loc[summary["rate_hz"].notna(), ["steady_error", "settling_s"]] = np.nan
+    for run in ("none", "thesis", "corrected"):
+        tables["sampled"][f"error_{run}_drive"] = np.nan
+    tables["sampled"]["error_none"] = np.where(np.arange(481) < 300, 10.0 ** (np.arange(481) / 3), np.nan)
+    figure = fig_a_05.draw(tables)
+    assert 10 < figure.axes[0].get_ylim()[1] < 1e4
+    assert "does not settle within the run with the drive" in fig_a_05.caption(tables)
+    assert "is unbounded and unbounded with held inputs" in fig_a_05.caption(tables)
+    assert len(saved(figure, "fig_a_05", fig_a_05.caption(tables))) == 4
 
 
 @pytest.mark.parametrize("name", ["fig_2_13", "fig_4_01", "fig_4_02", "fig_4_03", "fig_4_04"])

@@ -24,6 +24,7 @@ case $room in
 identification | design) touch "$output" ;;
 experiments) name=${command//-/_}
     [ $command != limits ] || name=limits_$(basename "$4" .json | sed s/design_//)
+    [ $command != sampled-rates ] || name=sampled
     [ $command != interpolation ] || touch "$output/interpolation_map.csv"
     touch "$output/$name.csv" "$output/${name}_summary.csv" ;;
 paper_figures) [ $command = summary ] && stem=$output/summary || stem=$output/$command
@@ -88,12 +89,20 @@ def test_a_refused_design_takes_only_what_hangs_on_it(make: Make, tmp_path: Path
         *("design_extended.json", "design_robust.json", "results/interpolation_map.csv"),
         *(
             f"results/{name}{part}.csv"
-            for name in ("extended", "f_gamma", "trade_off", "interpolation", "robustness", "limits_extended")
+            for name in (
+                "extended",
+                "f_gamma",
+                "trade_off",
+                "interpolation",
+                "robustness",
+                "limits_extended",
+                "sampled",
+            )
             for part in ("", "_summary")
         ),
         *(
             f"figures/fig_{n}.{kind}"
-            for n in ("2_10", "2_11", "4_01", "4_02", "4_03", "4_04", "a_01", "a_02", "a_03", "a_04")
+            for n in ("2_10", "2_11", "4_01", "4_02", "4_03", "4_04", "a_01", "a_02", "a_03", "a_04", "a_05")
             for kind in ("pdf", "txt")
         ),
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -89,17 +90,47 @@ def test_makefile_knows_every_figures_tables() -> None:
     from paper_figures.__main__ import figure_module, figure_names
 
     diagrams = set(re.search(r"DIAGRAMS := (.*)", makefile)[1].split())  # type: ignore[index]
-    assert len(figure_names()) == 24
+    assert len(figure_names()) == 25
     for name in figure_names():
         tables = set(figure_module(name).TABLES)
         assert tables <= feeds.get(name, set()), name
         assert (name in diagrams) == (not tables)
 
 
-def test_lock_file_has_hashes_and_no_address() -> None:
-    text = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+def locked(name: str) -> dict[str, str]:
+    """Each pin of a lock file, its marker too, with the lines that belong to it."""
+    text = (ROOT / name).read_text(encoding="utf-8")
+    blocks = re.split(r"^(?=[a-zA-Z0-9_.-]+==)", text, flags=re.MULTILINE)[1:]
+    return {block.splitlines()[0].removesuffix(" \\"): block for block in blocks}
+
+
+@pytest.mark.parametrize(("name", "least"), [("requirements.lock", 30), ("requirements-bench.lock", 5)])
+def test_lock_file_has_hashes_and_no_address(name: str, least: int) -> None:
+    text = (ROOT / name).read_text(encoding="utf-8")
     assert "://" not in text
     pins = re.findall(r"^[a-zA-Z0-9_.-]+==.*\\$", text, flags=re.MULTILINE)
-    blocks = re.split(r"^(?=[a-zA-Z0-9_.-]+==)", text, flags=re.MULTILINE)[1:]
-    assert len(pins) == len(blocks) > 30
-    assert all("--hash=sha256:" in block for block in blocks)
+    assert len(pins) == len(locked(name)) > least
+    assert all("--hash=sha256:" in block for block in locked(name).values())
+
+
+def test_lock_files_agree_on_what_both_name() -> None:
+    main, bench = locked("requirements.lock"), locked("requirements-bench.lock")
+    names = {pin.split("==")[0] for pin in main}
+    both = {pin: block for pin, block in bench.items() if pin.split("==")[0] in names}
+    assert both
+    for pin, block in both.items():
+        assert set(re.findall("sha256:[0-9a-f]+", block)) == set(re.findall("sha256:[0-9a-f]+", main.get(pin, ""))), pin
+
+
+def test_lock_files_hold_what_the_project_asks_for() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    wanted = {
+        "requirements.lock": [
+            *project["project"]["dependencies"],
+            *project["project"]["optional-dependencies"]["dev"],
+        ],
+        "requirements-bench.lock": project["dependency-groups"]["bench"],
+    }
+    for name, requirements in wanted.items():
+        pinned = {pin.split("==")[0] for pin in locked(name)}
+        assert {re.split("[<>=!~]", requirement)[0] for requirement in requirements} <= pinned, name

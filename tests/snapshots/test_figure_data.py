@@ -19,13 +19,15 @@ from experiments.f_gamma import f_gamma_tables
 from experiments.interpolation_regions import interpolation_tables
 from experiments.pid import pid_tables
 from experiments.robustness import robustness_tables
+from experiments.sampled_rates import sampled_rates_tables
 from experiments.trade_off import trade_off_tables
 from identification.frequency_response import read_sweeps
 from identification.model import read_model
 from identification.thesis import DATA
 from paper_figures.__main__ import figure_module, figure_names
 
-EXPERIMENTS = ("pid", "additive_error", "f_gamma", "delay_free", "extended", "trade_off", "interpolation", "robustness")
+LOOPS = ("pid", "delay_free", "extended", "sampled")
+EXPERIMENTS = (*LOOPS, "additive_error", "f_gamma", "trade_off", "interpolation", "robustness")
 TABLES = [*(f"{name}{part}" for name in EXPERIMENTS for part in ("", "_summary")), "interpolation_map"]
 MOST_ROWS = 120
 # The ends of their intervals are as exact as the intervals are narrow; tests/unit/test_physical_limits.py holds them.
@@ -50,6 +52,7 @@ def tables(extended_design: Design, delay_free_design: Design) -> dict[str, pd.D
         | extended_tables(extended_design)
         | trade_off_tables(extended_design)
         | interpolation_tables(extended_design)
+        | sampled_rates_tables(extended_design)
         | robustness_tables({"design_extended": extended_design, "design_robust": robust})
     )
 

@@ -129,7 +129,7 @@ def test_design_refuses_a_missing_folder(runner: CliRunner, tmp_path: Path) -> N
     refused(result, "cannot be written")
 
 
-APPENDIX = ["trade-off", "interpolation", "robustness", "limits"]
+APPENDIX = ["trade-off", "interpolation", "robustness", "limits", "sampled-rates"]
 SIMULATE = ["--limit", "12", "--anti-windup", "thesis", "--until", "1", "--sample-time", "0.01"]
 
 

@@ -13,7 +13,8 @@ from design.contract import Design
 from design.extended import design_extended
 from design.quasi_polynomial import DelayLoop, roots_right_of
 from design.smith_predictor import stabiliser
-from experiments.closed_loop import SaturatedLoop, simulate
+from experiments.closed_loop import simulate
+from experiments.saturated_loop import SaturatedLoop
 from identification.model import IdentifiedModel
 from identification.plant import AdditiveBound, Mode, PlantModel
 

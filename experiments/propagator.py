@@ -1,0 +1,133 @@
+"""One step of a linear system driven by polynomials: its Taylor series, and the table that maps its start to its end.
+
+    x' = A x + B m + D w,  m constant,  w = sum w_i tau^i,  tau = (t - t_k)/step  ->  x = sum x_i tau^i
+
+    x_p = X_p x_0 + K_p^B m + sum_{i < p} K_{p-i}^D w_i/C(p, i),    X_p = (step A)^p/p!,
+    K_p^B = step (step A)^(p-1) B/p!,  K_p^D likewise
+
+by x_{p+1} = step/(p+1) (A x_p + B m_p + D w_p), for tau^i integrates p - i times to tau^p/(C(p, i) (p - i)!).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from experiments.crossings import BINOMIAL, MOST
+
+Array = NDArray[Any]
+
+ROUNDING = 1e-16
+LEAST = 24  # degree: delayed polynomials may be of higher degree than the responses
+LANES = 16  # products of rows are taken in multiples of so many columns
+
+
+class Rows(NamedTuple):
+    """A sparse matrix in compressed rows: row r has ``data[q]`` in column ``indices[q]``, indptr[r] <= q < indptr[r + 1]."""
+
+    indptr: Array
+    indices: Array
+    data: Array
+
+
+def compressed(dense: Array) -> Rows:
+    """Compress a dense matrix; indices are unsigned, so that none is tested for a count from the end."""
+    matrix = csr_array(dense)
+    return Rows(matrix.indptr.astype(np.uint32), matrix.indices.astype(np.uint32), matrix.data)
+
+
+@njit(cache=True, nogil=True)
+def times(indptr: Array, indices: Array, data: Array, r: int, V: Array, i: int) -> float:
+    """Row r of a matrix in compressed rows times V[i]."""
+    value = 0.0
+    for q in range(indptr[r], indptr[r + 1]):
+        value += data[q] * V[i, indices[q]]
+    return value
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+def dot(table: Array, mode: int, row: int, z: Array, count: int) -> float:
+    """The first ``count`` entries of a row of one of two tables times those of z."""
+    value = 0.0
+    for c in range(count):
+        value += table[mode, row, c] * z[c]
+    return value
+
+
+@njit(cache=True, nogil=True)
+def tabulate(rows: Rows, n: int, k: int, step: float, margin: float) -> tuple[Array, Array, int]:
+    """Tabulate a step.
+
+    Parameters
+    ----------
+    rows
+        Over (x (n,), m, w (k,)): n rows [A B D], and a row for each signal that is wanted.
+    n, k
+        Numbers of states and of inputs that are polynomials.
+    step, margin
+        In seconds; how many steps the polynomials are read.
+
+    Returns
+    -------
+    ends (n, columns), polynomials (signals (degree + 1), columns), degree
+        Both times z = (x_0, m, w_0, w_1, ..., w_degree) are x at the step's end and the signals' coefficients, those
+        of degree 0 first. Beyond ``degree`` each entry's terms are below rounding, as far as margin; -1 where they
+        are not at the highest.
+    """
+    indptr, indices, data = rows
+    columns, signals = n + 1 + k, len(indptr) - 1 - n
+    # responses[p] holds X_p, K_p^B and K_p^D side by side, outputs[p] the signals of them
+    responses, outputs = np.zeros((MOST + 1, columns, columns)), np.zeros((MOST + 1, signals, columns))
+    largest = np.zeros((n, columns))
+    for r in range(n):
+        responses[0, r, r] = largest[r, r] = 1.0
+    degree, power = -1, 1.0
+    for p in range(MOST + 1):
+        if p > 0:
+            power *= margin
+            small = True
+            for r in range(n):
+                for q in range(indptr[r], indptr[r + 1]):
+                    column, value = indices[q], data[q] * step / p
+                    if column < n:
+                        for c in range(columns):
+                            responses[p, r, c] += value * responses[p - 1, column, c]
+                    elif p == 1:
+                        responses[p, r, column] += value
+                for c in range(columns):
+                    size = abs(responses[p, r, c])
+                    largest[r, c] = max(largest[r, c], size)
+                    if size * power > ROUNDING * largest[r, c]:
+                        small = False
+            if small and (k == 0 or p >= LEAST):
+                degree = p
+                break
+        for s in range(signals):
+            for q in range(indptr[n + s], indptr[n + s + 1]):
+                column, value = indices[q], data[q]
+                if column < n:
+                    for c in range(columns):
+                        outputs[p, s, c] += value * responses[p, column, c]
+                elif p == 0:
+                    outputs[p, s, column] += value
+    wide = n + 1 + k * (degree + 1)
+    ends, polynomials = np.zeros((n, wide)), np.zeros((signals * (degree + 1), wide))
+    for p in range(degree + 1):
+        for r in range(n):
+            for c in range(n + 1):
+                ends[r, c] += responses[p, r, c]
+            for i in range(p):
+                for j in range(k):
+                    ends[r, n + 1 + k * i + j] += responses[p - i, r, n + 1 + j] / BINOMIAL[p, i]
+        for s in range(signals):
+            row = signals * p + s
+            for c in range(n + 1):
+                polynomials[row, c] = outputs[p, s, c]
+            for i in range(p + 1):
+                for j in range(k):
+                    polynomials[row, n + 1 + k * i + j] = outputs[p - i, s, n + 1 + j] / BINOMIAL[p, i]
+    return ends, polynomials, degree

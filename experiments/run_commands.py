@@ -1,0 +1,200 @@
+"""The commands that run one design once: ``simulate`` in continuous time, ``sampled`` with a computer and a drive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import pandas as pd
+
+from design.anti_windup import AntiWindup, printed_form
+from design.contract import Design, read_design
+from experiments.closed_loop import simulate
+from experiments.loops import design_loop
+from experiments.metrics import last_saturation
+from experiments.reference_file import read_reference
+from experiments.sampled import Drive, simulate_sampled
+from experiments.sampled_controller import METHODS
+from experiments.scenarios import Reference, SampledReference, thesis_reference
+from experiments.tables import write_tables
+from identification.files import InputError
+from identification.model import read_model
+from identification.plant import PlantModel
+
+MOST_ROWS = 1e7
+
+DESIGN = click.argument("design", type=click.Path(path_type=Path, dir_okay=False))
+
+_RUN = (
+    DESIGN,
+    click.option("--limit", type=float, required=True, help="Saturation limits +-LIMIT; inf for none."),
+    click.option("--anti-windup", required=True, help="none, thesis, corrected, or another of DESIGN."),
+    click.option("--until", type=float, required=True, help="Length of the run in seconds."),
+    click.option(
+        "--amplitude", type=float, multiple=True, help="Of the reference; once a frequency; else the thesis's."
+    ),
+    click.option("--phase", type=float, multiple=True, help="In radians; once a frequency; the thesis's unless given."),
+    click.option("--offset", type=float, help="Of the reference; the thesis's unless given."),
+    click.option(
+        "--slope", type=float, help="Of a ramp added to the reference, a second; --amplitude 0 leaves it alone."
+    ),
+    click.option(
+        "--reference",
+        type=click.Path(path_type=Path, dir_okay=False),
+        help="CSV of time_s and reference, joined by straight lines, instead of the sinusoids.",
+    ),
+    click.option(
+        "--plant", help="The true plant: a model.json, table or implied; the design's own model unless given."
+    ),
+    click.option("--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV to write."),
+)
+
+
+def _run_options(command: Callable[..., None]) -> Callable[..., None]:
+    """What both commands take."""
+    for option in reversed(_RUN):
+        command = option(command)
+    return command
+
+
+@click.command("simulate")
+@_run_options
+@click.option("--sample-time", type=float, required=True, help="Distance of the output's rows in seconds.")
+@click.option("--alpha", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
+@click.option("--beta", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
+@click.option("--gamma", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
+def simulate_command(
+    design: Path,
+    limit: float,
+    anti_windup: str,
+    until: float,
+    sample_time: float,
+    alpha: float | None,
+    beta: float | None,
+    gamma: float | None,
+    plant: str | None,
+    output: Path,
+    **reference: Any,
+) -> None:
+    """Run DESIGN from rest: time_s, reference, output, error, control, saturated_control."""
+    positive_limit(limit)
+    if not (np.isfinite([until, sample_time]).all() and 0 < sample_time <= until):
+        raise InputError(
+            f"--until is {until:g} and --sample-time {sample_time:g}; expected 0 < sample time <= until, both finite"
+        )
+    _require_few_rows(until / sample_time)
+    content = read_design(design)
+    kind = _compensator(content, anti_windup, {"alpha": alpha, "beta": beta, "gamma": gamma})
+    # the quotient of two decimals may come out a rounding below a whole number
+    time_s = sample_time * np.arange(int(until / sample_time * (1 + 1e-12)) + 1)
+    loop = design_loop(content, _reference(content, **reference), kind, _true_plant(plant))
+    run = simulate(loop, (-limit, limit), time_s)
+    table = pd.DataFrame(
+        {
+            "time_s": run.time_s,
+            "reference": run.outputs["reference"],
+            "output": run.outputs["output"],
+            "error": run.outputs["error"],
+            "control": run.control,
+            "saturated_control": run.saturated_control,
+        }
+    )
+    write_tables({output: table}, _inputs(design, plant, reference["reference"]))
+    saturated = last_saturation(run)
+    said = "saturated to the end" if np.isnan(saturated) else f"last saturated at {saturated:.6g} s"
+    click.echo(f"{len(table)} rows -> {output}; {len(run.events_s)} crossings of the limits, {said}")
+
+
+@click.command("sampled")
+@_run_options
+@click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
+@click.option("--method", type=click.Choice(METHODS), required=True, help="How its blocks are discretised.")
+@click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels; 0, no levels, by default.")
+@click.option("--slew", type=float, default=math.inf, help="Most change of the actuator in a second; inf by default.")
+@click.option("--input-delay", type=float, default=0.0, help="From sample to actuator in seconds; 0 by default.")
+def sampled_command(
+    design: Path,
+    limit: float,
+    anti_windup: str,
+    until: float,
+    rate: float,
+    method: str,
+    quantum: float,
+    slew: float,
+    input_delay: float,
+    plant: str | None,
+    output: Path,
+    **reference: Any,
+) -> None:
+    """Run DESIGN's controller on a computer with a real actuator, a row each sample, the columns as of simulate.
+
+    Of these, control is what the computer asks for, and saturated_control what the actuator gives out.
+    """
+    positive_limit(limit)
+    drive = Drive(rate, method, (-limit, limit), quantum, slew, input_delay)
+    _require_few_rows(until * rate)
+    content = read_design(design)
+    kind = _compensator(content, anti_windup, {})
+    run = simulate_sampled(content, _reference(content, **reference), kind, drive, until, _true_plant(plant))
+    write_tables({output: pd.DataFrame(vars(run))}, _inputs(design, plant, reference["reference"]))
+    beyond = run.time_s[np.abs(run.control) > limit]
+    last = f", the last at {beyond[-1]:.6g} s" if len(beyond) else ""
+    click.echo(f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}")
+
+
+def positive_limit(limit: float | None) -> float | None:
+    """Pass a limit on, if there is one; raises InputError when it is not positive."""
+    if limit is not None and not limit > 0:
+        raise InputError(f"--limit is {limit:g}; expected a positive number")
+    return limit
+
+
+def _require_few_rows(rows: float) -> None:
+    if rows > MOST_ROWS:
+        raise InputError(f"{rows:.3g} rows are asked for; expected at most {MOST_ROWS:.3g}")
+
+
+def _compensator(design: Design, name: str, numbers: Mapping[str, float | None]) -> AntiWindup | None:
+    given = {key: value for key, value in numbers.items() if value is not None}
+    if given and name != "thesis":
+        raise InputError(f"--{next(iter(given))} belongs to --anti-windup thesis; found --anti-windup {name}")
+    if given:
+        return printed_form({**design.anti_windup["thesis"], **given})
+    return None if name == "none" else design.compensator(name)
+
+
+def _reference(
+    design: Design,
+    amplitude: tuple[float, ...],
+    phase: tuple[float, ...],
+    offset: float | None,
+    slope: float | None,
+    reference: Path | None,
+) -> Reference | SampledReference:
+    """The thesis's reference with what the options change in it, or the one of a file."""
+    if reference is not None:
+        options = {"amplitude": amplitude, "phase": phase, "offset": offset, "slope": slope}
+        for name, value in options.items():
+            if value not in ((), None):
+                raise InputError(f"--{name} belongs to a reference of sinusoids; found --reference {reference} too")
+        return read_reference(reference)
+    usual = thesis_reference(design.kind, design.reference_omegas)
+    return Reference(
+        amplitude or usual.amplitudes,
+        usual.omegas,
+        phase or usual.phases_rad,
+        usual.offset if offset is None else offset,
+        usual.slope if slope is None else slope,
+    )
+
+
+def _true_plant(plant: str | None) -> PlantModel | None:
+    return None if plant is None else read_model(plant).plant
+
+
+def _inputs(design: Path, plant: str | None, reference: Path | None) -> list[Path]:
+    return [design, *([Path(plant)] if plant else []), *([reference] if reference else [])]

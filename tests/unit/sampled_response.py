@@ -1,0 +1,14 @@
+"""The frequency response of a block's difference equations, as their class states them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from experiments.sampled_controller import SampledBlock
+
+
+def response(block: SampledBlock, z: np.ndarray) -> np.ndarray:
+    """w(z)/i(z) at points z (s,) off the poles: shape (s, m)."""
+    identity, lag = np.eye(len(block.b)), 1 / z[:, None]
+    states = np.array([np.linalg.solve(point * identity - block.A, block.b) for point in z]).reshape(len(z), -1)
+    return (states @ block.C.T + block.d) * (block.now + block.before * lag) * lag**block.whole
