@@ -1,20 +1,24 @@
-"""One run of the chapter 4 loop against python-control with Pade, jitcdde, and DOP853 by the method of steps."""
+"""The chapter 4 loop against python-control with Pade, jitcdde, DOP853 by the method of steps, and plain C."""
 
 from __future__ import annotations
 
 import gc
+import os
 import sys
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from compiled_c import c_run
 from peers import SAID_OF_JITCDDE, collapsed_response, jitcdde_run, pade_response
 
 from design.contract import Design
 from design.extended import design_extended
+from experiments.batch import simulate_many
 from experiments.closed_loop import Run, simulate
 from experiments.loops import design_loop
 from experiments.pade import with_pade
@@ -28,7 +32,7 @@ from oracle import reference_run
 LIMIT = 12.0
 LIMITS = (-LIMIT, LIMIT)
 WHOLE_S = 30.0
-PADE_S = 1.0  # python-control takes seconds for each second
+PADE_S = 3.0  # python-control takes seconds for each second
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +66,7 @@ def test_ours_alone(benchmark: Any, loop: SaturatedLoop, horizon_s: float) -> No
 
 @pytest.mark.parametrize("form", ["interconnected", "collapsed"])
 def test_against_python_control(design: Design, loop: SaturatedLoop, against: Callable[..., None], form: str) -> None:
-    """One second with second-order Pade: blocks joined by interconnect, and the whole loop as one function."""
+    """Three seconds with second-order Pade: blocks joined by interconnect, and the whole loop as one function."""
     time_s = times(PADE_S)
     pade = simulate(with_pade(loop, 2), LIMITS, time_s).outputs["output"]
     if form == "interconnected":
@@ -83,6 +87,7 @@ def test_against_python_control(design: Design, loop: SaturatedLoop, against: Ca
 def test_against_jitcdde(loop: SaturatedLoop, against: Callable[..., None]) -> None:
     """The whole run, a sample every 10 ms; compiling is not in the ratio."""
     time_s = times(WHOLE_S)[50::10]
+    loop = replace(loop, outputs={"output": loop.outputs["output"]})  # jitcdde is asked for no more
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         peer, compile_s = jitcdde_run(loop, LIMIT, time_s, tolerance=1e-8)
@@ -110,3 +115,33 @@ def test_against_dop853_by_steps(loop: SaturatedLoop, against: Callable[..., Non
         rounds=1,
         error=error,
     )
+
+
+def test_against_c(loop: SaturatedLoop, against: Callable[..., None]) -> None:
+    """The whole run, a sample every 10 ms: all of ours, its setting up too, against the same algorithm in C alone."""
+    time_s = times(WHOLE_S)[::10]
+
+    def error(ours: Run, theirs: np.ndarray) -> str:
+        return f"{WHOLE_S:g} s: {off(theirs, np.array(list(ours.outputs.values()))):.1e} of all outputs"
+
+    against(lambda: simulate(loop, LIMITS, time_s), c_run(loop, LIMIT, time_s), rounds=30, error=error)
+
+
+def test_a_batch_against_single_runs(design: Design, against: Callable[..., None]) -> None:
+    """A hundred runs of 30 s in one call, on all cores, against one after the other on one."""
+    reference, names, time_s = thesis_reference("extended", [1.5]), ["thesis", "corrected"], times(WHOLE_S)[::10]
+    kinds = {name: design.compensator(name) for name in names}
+    plants = [replace(design.plant, gain=design.plant.gain * factor) for factor in np.linspace(0.9, 1.1, 50)]
+
+    def single() -> list[Run]:
+        loops = [design_loop(design, reference, kind, plant) for plant in plants for kind in kinds.values()]
+        return [simulate(loop, LIMITS, time_s) for loop in loops]
+
+    def batch() -> list[object]:
+        return [run for _, run in simulate_many(design, plants, [reference], kinds, [LIMIT], time_s)]
+
+    def error(ours: list[Run], theirs: list[Run]) -> str:
+        same = all(np.array_equal(a.control, b.control) for a, b in zip(ours, theirs, strict=True))
+        return f"{os.cpu_count()} cores: {'the same' if same else 'other'} numbers to the last bit"
+
+    against(batch, single, our_rounds=5, error=error)

@@ -71,9 +71,9 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
 
     Notes
     -----
-    Dead times are exact and events are located on the polynomials, see :mod:`experiments.taylor`. The step is
-    set by the fastest eigenvalue of the loop, saturated or not, and by the shortest dead time; it is halved
-    until the last term of every series is below 1e-11 of the largest value of its state.
+    Dead times are exact and events are located on the polynomials, see :mod:`experiments.taylor`. The step, see
+    :func:`experiments.compiled_loop.compile_loop`, is halved until the last term of every polynomial is below 1e-11 of
+    the largest value of its signal.
     """
     low, high = limits
     if not low < high:
@@ -81,15 +81,16 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
     increasing = len(time_s) > 0 and time_s[0] >= 0 and time_s[-1] > 0 and np.all(np.diff(time_s) > 0)
     if not (increasing and np.all(np.isfinite(time_s))):
         raise InputError("the sample times are not increasing finite numbers from zero on that end after zero")
-    compiled, tail = compile_loop(loop), 0.0
+    compiled = compile_loop(loop)
     horizon = float(time_s[-1])
-    if horizon / compiled.step > MOST_STEPS:
-        raise InputError(
-            f"the run needs {horizon / compiled.step:.3g} steps of {compiled.step:.3g} s, set by its shortest dead time "
-            f"or fastest pole; expected at most {MOST_STEPS:.3g} (a shorter run, a dead time of zero, or a slower design)"
-        )
     most_events, room = 4096, 64
     while True:
+        step = compiled.step
+        if horizon / step > MOST_STEPS:
+            raise InputError(
+                f"the run needs {horizon / step:.3g} steps of {step:.3g} s, set by its shortest dead time or fastest "
+                f"pole; expected at most {MOST_STEPS:.3g} (a shorter run, a dead time of zero, or a slower design)"
+            )
         values, events, modes, status, end, _, tail = taylor.integrate(
             compiled.unsaturated,
             compiled.saturated,
@@ -102,8 +103,7 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
             float(low),
             float(high),
             horizon,
-            compiled.step,
-            compiled.margin,
+            step,
             time_s - compiled.lags[:, None],
             compiled.groups,
             int(MOST_STEPS),
@@ -112,8 +112,8 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
         )
         if status == taylor.CROWDED:
             most_events, room = 4 * most_events, 4 * room
-        elif tail > TAIL:
-            compiled = compile_loop(loop, compiled.step / 2)
+        elif status == taylor.COMPLETE and tail > TAIL:
+            compiled = compile_loop(loop, step / 2)
         else:
             break
     if status == taylor.DIVERGED:

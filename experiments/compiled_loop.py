@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.propagator import LANES, Rows, compressed, tabulate
+from experiments.propagator import Rows, compressed, tabulate, whole_lanes
 from experiments.saturated_loop import SaturatedLoop
 
 FURTHEST = 4.0  # fastest root times step: the terms of a series grow to exp of it, and two digits are lost
-MARGIN = 1.5  # see integrate; 1 where there is one dead time
 
 
 @dataclass(frozen=True)
@@ -19,7 +18,7 @@ class CompiledLoop:
 
     Parameters
     ----------
-    unsaturated, saturated, ends, polynomials, delays, x0, step, margin, groups
+    unsaturated, saturated, ends, polynomials, delays, x0, step, groups
         As there.
     lags
         Shape (g,): how much earlier each group is sampled, in seconds; zero first.
@@ -34,7 +33,6 @@ class CompiledLoop:
     delays: np.ndarray
     x0: np.ndarray
     step: float
-    margin: float
     groups: np.ndarray
     lags: np.ndarray
     reading: np.ndarray
@@ -59,13 +57,12 @@ def compile_loop(loop: SaturatedLoop, most_step: float = np.inf) -> CompiledLoop
     saturated = compressed(np.vstack([np.hstack([A, loop.B[:, None], D]), *read]))
 
     fastest = max(np.abs(np.linalg.eigvals(matrix)).max() for matrix in (A, free_A))
-    margin = MARGIN if len(set(delays)) > 1 else 1.0
-    step = min(FURTHEST / (margin * fastest) if fastest > 0 else 1.0, most_step)
+    step = min(FURTHEST / fastest if fastest > 0 else 1.0, most_step)
     if k:
         shortest = float(delays.min())
         step = shortest / np.ceil(shortest / step)
     while True:
-        tables = [tabulate(rows, n, k, step, margin) for rows in (unsaturated, saturated)]
+        tables = [tabulate(rows, n, k, step) for rows in (unsaturated, saturated)]
         if all(degree >= 0 for _, _, degree in tables):
             break
         step /= 2
@@ -77,7 +74,6 @@ def compile_loop(loop: SaturatedLoop, most_step: float = np.inf) -> CompiledLoop
         delays=delays,
         x0=loop.x0,
         step=step,
-        margin=margin,
         groups=groups,
         lags=lags,
         reading=reading,
@@ -86,31 +82,46 @@ def compile_loop(loop: SaturatedLoop, most_step: float = np.inf) -> CompiledLoop
 
 def _merged(loop: SaturatedLoop) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """D, E, Z and the dead times of the delayed signals that drive the loop, one for all that enter it alike."""
-    drives = (loop.delays > 0) & loop.Z.any(axis=1) & (loop.D.any(axis=0) | (loop.E != 0))
-    keys = np.vstack([loop.delays, loop.E, loop.D])[:, drives]
-    entering, place = np.unique(keys, axis=1, return_inverse=True)
-    Z = np.zeros((entering.shape[1], len(loop.x0)))
-    np.add.at(Z, place.reshape(-1), loop.Z[drives])
-    return entering[2:], entering[1], Z, entering[0]
+    entering: dict[bytes, list[int]] = {}
+    for j in range(len(loop.delays)):
+        if loop.delays[j] > 0 and loop.Z[j].any() and (loop.E[j] != 0 or loop.D[:, j].any()):
+            alike = np.array([loop.delays[j], loop.E[j], *loop.D[:, j]]) + 0.0  # of -0 and 0 one
+            entering.setdefault(alike.tobytes(), []).append(j)
+    first = [alike[0] for alike in entering.values()]
+    Z = np.array([loop.Z[alike].sum(axis=0) for alike in entering.values()]).reshape(len(first), len(loop.x0))
+    return loop.D[:, first], loop.E[first], Z, loop.delays[first]
 
 
 def _watched(loop: SaturatedLoop) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """What the outputs are made of: rows over x, where each group of them begins, its lag, and the outputs' rows."""
-    rows_x = np.array([x for x, _ in loop.outputs.values()]).reshape(len(loop.outputs), len(loop.x0))
-    rows_w = np.array([w for _, w in loop.outputs.values()]).reshape(len(loop.outputs), len(loop.delays))
-    own, place = np.unique(rows_x, axis=0, return_inverse=True)
-    lags = np.unique(np.append(loop.delays[rows_w.any(axis=0)], 0.0))
-    delayed = [np.flatnonzero((loop.delays == lag) & rows_w.any(axis=0)) for lag in lags]
-    rows = np.vstack([own, *(loop.Z[chosen] for chosen in delayed)])
-    reading = np.hstack([np.eye(len(own))[place.reshape(-1)], *(rows_w[:, chosen] for chosen in delayed)])
-    counts = [len(own) + len(delayed[0]), *(len(chosen) for chosen in delayed[1:])]
-    return rows, np.cumsum([0, *counts]), lags, reading
+    used = [j for j in range(len(loop.delays)) if any(w[j] != 0 for _, w in loop.outputs.values())]
+    lags = sorted({0.0, *(float(loop.delays[j]) for j in used)})
+    rows: list[np.ndarray] = []
+    groups, own, delayed = [0], {}, {}
+    for lag in lags:
+        if lag == 0:
+            for name, (x, _) in loop.outputs.items():
+                if x.any():
+                    own[name] = len(rows)
+                    rows.append(x)
+        for j in used:
+            if loop.delays[j] == lag:
+                delayed[j] = len(rows)
+                rows.append(loop.Z[j])
+        groups.append(len(rows))
+    reading = np.zeros((len(loop.outputs), len(rows)))
+    for into, (name, (_, w)) in zip(reading, loop.outputs.items(), strict=True):
+        if name in own:
+            into[own[name]] = 1.0
+        for j in used:
+            into[delayed[j]] += w[j]
+    return np.array(rows).reshape(len(rows), len(loop.x0)), np.array(groups), np.array(lags), reading
 
 
 def _stacked(tables: list[np.ndarray]) -> np.ndarray:
     """Tables on one another, filled with zeros to one size and to whole lanes."""
     rows, columns = np.max([table.shape for table in tables], axis=0)
-    stack = np.zeros((len(tables), rows, -(-columns // LANES) * LANES))
+    stack = np.zeros((len(tables), rows, whole_lanes(columns)))
     for into, table in zip(stack, tables, strict=True):
         into[: table.shape[0], : table.shape[1]] = table
     return stack

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -59,18 +60,53 @@ def design_loop(
                 +---- y_d <-- theta2 <-- u_tilde            '                |
                 +------------------------------------------------------------+
     """
+    return plant_loop(realized_controller(design, anti_windup), plant or design.loop_plant, reference)
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A design's controller and anti-windup as state spaces.
+
+    Parameters
+    ----------
+    forward, feedback
+        C = forward/(1 - feedback exp(-delay_s s)).
+    theta
+        [theta1~; theta2], without the dead time of theta2.
+    delay_s
+        Of the controller's model, in seconds.
+    """
+
+    forward: StateSpace
+    feedback: StateSpace
+    theta: StateSpace
+    delay_s: float
+
+
+def realized_controller(design: Design, anti_windup: AntiWindup | None) -> Controller:
+    """What :func:`design_loop` has besides the plant and the reference."""
     model = design.loop_plant
-    plant = model if plant is None else plant
-    if plant.relative_degree < 1:
-        raise InputError("the true plant has as many zeros as poles; expected more poles, or the loop is algebraic")
-    P = realize(plant_block(plant))
     forward, feedback = (realize(block) for block in design.controller_parts())
     if anti_windup is None:
         theta = realize(Block(0.0), Block(0.0))
     else:
         theta = realize(anti_windup.theta1_tilde, anti_windup.theta2(model))
-    delays = np.array([plant.delay_s, model.delay_s, model.delay_s])
-    return _assemble(P, forward, feedback, theta, reference.generator(), delays)
+    return Controller(forward, feedback, theta, model.delay_s)
+
+
+def plant_loop(controller: Controller, plant: PlantModel, reference: Reference | SampledReference) -> SaturatedLoop:
+    """:func:`design_loop` around a true plant.
+
+    Raises
+    ------
+    InputError
+        The plant has as many zeros as poles.
+    """
+    if plant.relative_degree < 1:
+        raise InputError("the true plant has as many zeros as poles; expected more poles, or the loop is algebraic")
+    P = realize(plant_block(plant))
+    delays = np.array([plant.delay_s, controller.delay_s, controller.delay_s])
+    return _assemble(P, controller.forward, controller.feedback, controller.theta, reference.generator(), delays)
 
 
 def _assemble(

@@ -15,19 +15,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from experiments.crossings import BINOMIAL, MOST
 
 Array = NDArray[Any]
 
 ROUNDING = 1e-16
+NEGLIGIBLE = 1e-14  # a term, relative to the largest value of its signal so far
 LEAST = 24  # degree: delayed polynomials may be of higher degree than the responses
 LANES = 16  # products of rows are taken in multiples of so many columns
 
 
 class Rows(NamedTuple):
-    """A sparse matrix in compressed rows: row r has ``data[q]`` in column ``indices[q]``, indptr[r] <= q < indptr[r + 1]."""
+    """A sparse matrix: row r has ``data[q]`` in column ``indices[q]``, indptr[r] <= q < indptr[r + 1]."""
 
     indptr: Array
     indices: Array
@@ -36,8 +36,9 @@ class Rows(NamedTuple):
 
 def compressed(dense: Array) -> Rows:
     """Compress a dense matrix; indices are unsigned, so that none is tested for a count from the end."""
-    matrix = csr_array(dense)
-    return Rows(matrix.indptr.astype(np.uint32), matrix.indices.astype(np.uint32), matrix.data)
+    row, column = np.nonzero(dense)
+    indptr = np.searchsorted(row, np.arange(len(dense) + 1))
+    return Rows(indptr.astype(np.uint32), column.astype(np.uint32), dense[row, column])
 
 
 @njit(cache=True, nogil=True)
@@ -49,17 +50,23 @@ def times(indptr: Array, indices: Array, data: Array, r: int, V: Array, i: int) 
     return value
 
 
+@njit(cache=True, nogil=True)
+def whole_lanes(count: int) -> int:
+    """``count`` rounded up to a multiple of LANES."""
+    return (count + LANES - 1) // LANES * LANES
+
+
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def dot(table: Array, mode: int, row: int, z: Array, count: int) -> float:
+def dot(table: Array, which: int, row: int, z: Array, count: int) -> float:
     """The first ``count`` entries of a row of one of two tables times those of z."""
     value = 0.0
     for c in range(count):
-        value += table[mode, row, c] * z[c]
+        value += table[which, row, c] * z[c]
     return value
 
 
 @njit(cache=True, nogil=True)
-def tabulate(rows: Rows, n: int, k: int, step: float, margin: float) -> tuple[Array, Array, int]:
+def tabulate(rows: Rows, n: int, k: int, step: float) -> tuple[Array, Array, int]:
     """Tabulate a step.
 
     Parameters
@@ -68,15 +75,15 @@ def tabulate(rows: Rows, n: int, k: int, step: float, margin: float) -> tuple[Ar
         Over (x (n,), m, w (k,)): n rows [A B D], and a row for each signal that is wanted.
     n, k
         Numbers of states and of inputs that are polynomials.
-    step, margin
-        In seconds; how many steps the polynomials are read.
+    step
+        In seconds.
 
     Returns
     -------
     ends (n, columns), polynomials (signals (degree + 1), columns), degree
         Both times z = (x_0, m, w_0, w_1, ..., w_degree) are x at the step's end and the signals' coefficients, those
-        of degree 0 first. Beyond ``degree`` each entry's terms are below rounding, as far as margin; -1 where they
-        are not at the highest.
+        of degree 0 first. Beyond ``degree`` each entry's terms are below rounding; -1 where they are not at the
+        highest.
     """
     indptr, indices, data = rows
     columns, signals = n + 1 + k, len(indptr) - 1 - n
@@ -85,10 +92,9 @@ def tabulate(rows: Rows, n: int, k: int, step: float, margin: float) -> tuple[Ar
     largest = np.zeros((n, columns))
     for r in range(n):
         responses[0, r, r] = largest[r, r] = 1.0
-    degree, power = -1, 1.0
+    degree = -1
     for p in range(MOST + 1):
         if p > 0:
-            power *= margin
             small = True
             for r in range(n):
                 for q in range(indptr[r], indptr[r + 1]):
@@ -101,7 +107,7 @@ def tabulate(rows: Rows, n: int, k: int, step: float, margin: float) -> tuple[Ar
                 for c in range(columns):
                     size = abs(responses[p, r, c])
                     largest[r, c] = max(largest[r, c], size)
-                    if size * power > ROUNDING * largest[r, c]:
+                    if size > ROUNDING * largest[r, c]:
                         small = False
             if small and (k == 0 or p >= LEAST):
                 degree = p
@@ -131,3 +137,47 @@ def tabulate(rows: Rows, n: int, k: int, step: float, margin: float) -> tuple[Ar
                 for j in range(k):
                     polynomials[row, n + 1 + k * i + j] = outputs[p - i, s, n + 1 + j] / BINOMIAL[p, i]
     return ends, polynomials, degree
+
+
+@njit(cache=True, nogil=True)
+def advance(
+    rows: Rows, V: Array, n: int, known: int, most: int, scale: Array, step: float, reach: float, x: Array
+) -> None:
+    """x at tau = reach, term by term.
+
+    V (most + 1, n + 1 + k) holds the terms of (x, m, w): V[0] and the delayed signals, to the degree ``known``, are
+    given; to which they matter. The sum ends where a term is negligible against ``scale``, or after ``most``.
+    """
+    indptr, indices, data = rows
+    power = 1.0
+    for r in range(n):
+        x[r] = V[0, r]
+    for i in range(most):
+        factor = step / (i + 1)
+        power *= reach
+        negligible = i >= known
+        for r in range(n):
+            term = factor * times(indptr, indices, data, r, V, i)
+            V[i + 1, r] = term
+            term *= power
+            x[r] += term
+            if negligible and abs(term) > NEGLIGIBLE * scale[r]:
+                negligible = False
+        if negligible:
+            break
+
+
+@njit(cache=True, nogil=True)
+def expand(
+    polynomials: Array, which: int, signal: int, signals: int, z: Array, columns: int, known: int, most: int,
+    size: Array, at: int, c: Array,
+) -> int:  # fmt: skip
+    """Fill c with a signal's coefficients until they are negligible against its ``size[at]`` so far; the degree."""
+    quiet = 0
+    for degree in range(most + 1):
+        c[degree] = dot(polynomials, which, signals * degree + signal, z, columns)
+        size[at] = max(size[at], abs(c[degree]))
+        quiet = quiet + 1 if degree > known and abs(c[degree]) <= NEGLIGIBLE * size[at] else 0
+        if quiet == 2:
+            return degree
+    return most

@@ -15,95 +15,23 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from experiments.crossings import BINOMIAL, leave
-from experiments.propagator import LANES, Rows, dot, times
+from experiments.crossings import leave
+from experiments.mesh import gap, insert, shift
+from experiments.propagator import NEGLIGIBLE, Rows, advance, dot, expand, times, whole_lanes
 
 Array = NDArray[Any]
 
-NEGLIGIBLE = 1e-14  # a term, or a kink, relative to the largest value of its signal so far
 NOTHING = 1e-30  # what is smaller than this share of the largest value of its signal so far is zero
+BEYOND = 0.5  # of a step: how far beyond its end, where no kink is, the polynomial of a cut step is read
 DIVERGENT = 1e100  # a loop whose state passes this diverges
 
 COMPLETE, DIVERGED, ENDLESS, CROWDED = 0, 1, 2, 3
 
 
 @njit(cache=True, nogil=True)
-def _shift(c: Array, degree: int, delta: float) -> None:
-    """Replace the coefficients of p(tau) by those of p(tau + delta)."""
-    power = np.empty(degree + 1)
-    power[0] = 1.0
-    for i in range(degree):
-        power[i + 1] = power[i] * delta
-    for m in range(degree + 1):
-        value = 0.0
-        for i in range(m, degree + 1):
-            value += BINOMIAL[i, m] * power[i - m] * c[i]
-        c[m] = value
-
-
-@njit(cache=True, nogil=True)
-def _insert(queue: Array, queued: int, t: float) -> int:
-    """Insert a time into the sorted queue, unless it is there already, to rounding; its new length."""
-    k = queued
-    while k > 0 and queue[k - 1] > t:
-        k -= 1
-    near = 1e-13 * (1.0 + abs(t))
-    if (k > 0 and t - queue[k - 1] <= near) or (k < queued and queue[k] - t <= near):
-        return queued
-    for q in range(queued, k, -1):
-        queue[q] = queue[q - 1]
-    queue[k] = t
-    return queued + 1
-
-
-@njit(cache=True, nogil=True)
-def _series(
-    rows: Rows, V: Array, n: int, known: int, most: int, scale: Array, step: float, reach: float, x: Array
-) -> None:
-    """x at tau = reach, term by term.
-
-    V (most + 1, n + 1 + k) holds the terms of (x, m, w): V[0] and the delayed signals, to the degree ``known``, are
-    given. The sum ends where a term is negligible against ``scale``, or after ``most``.
-    """
-    indptr, indices, data = rows
-    power = 1.0
-    for r in range(n):
-        x[r] = V[0, r]
-    for i in range(most):
-        factor = step / (i + 1)
-        power *= reach
-        negligible = i >= known
-        for r in range(n):
-            term = factor * times(indptr, indices, data, r, V, i)
-            V[i + 1, r] = term
-            term *= power
-            x[r] += term
-            if negligible and abs(term) > NEGLIGIBLE * scale[r]:
-                negligible = False
-        if negligible:
-            break
-
-
-@njit(cache=True, nogil=True)
-def _polynomial(
-    polynomials: Array, which: int, signal: int, signals: int, z: Array, columns: int, known: int, most: int,
-    size: Array, at: int, c: Array,
-) -> int:  # fmt: skip
-    """Fill c with a signal's coefficients until they are negligible against its ``size[at]`` so far; the degree."""
-    quiet = 0
-    for degree in range(most + 1):
-        c[degree] = dot(polynomials, which, signals * degree + signal, z, columns)
-        size[at] = max(size[at], abs(c[degree]))
-        quiet = quiet + 1 if degree > known and abs(c[degree]) <= NEGLIGIBLE * size[at] else 0
-        if quiet == 2:
-            return degree
-    return most
-
-
-@njit(cache=True, nogil=True)
 def integrate(
     unsaturated: Rows, saturated: Rows, ends: Array, polynomials: Array, delays: Array, x0: Array, reset_times: Array,
-    resets: Array, low: float, high: float, horizon: float, step: float, margin: float, samples: Array,
+    resets: Array, low: float, high: float, horizon: float, step: float, samples: Array,
     groups: Array, most_steps: int, most_events: int, room: int,
 ) -> tuple[Array, Array, Array, int, float, int, float]:  # fmt: skip
     """Integrate one loop from rest of its delayed signals, w_j(t < 0) = Z_j x0.
@@ -125,9 +53,6 @@ def integrate(
         Saturation limits, may be infinite.
     horizon, step
         End time and the tables' step in seconds, step <= min(delays).
-    margin
-        How many steps a polynomial is read from where it starts, >= 1; more than 1 spares steps where the images of
-        one mesh under different dead times interleave.
     samples, groups
         Shapes (g, s), (g + 1,): groups[i] ... groups[i + 1] - 1 of what is watched is sampled at the sorted times
         samples[i] <= horizon; before zero it is as at zero. u is sampled with the first group.
@@ -138,8 +63,8 @@ def integrate(
     -------
     values (1 + o, s), events (e,), modes (e,), status, end, steps, tail
         u and what is watched at the samples; event times with the mode entered (-1, 0, 1); COMPLETE, DIVERGED,
-        ENDLESS (too many steps) or CROWDED (too many events, or too little room); the time reached; the number of steps;
-        the largest last term of a signal's polynomial, as a share of the largest that the signal was.
+        ENDLESS (too many steps) or CROWDED (too many events, or too little room); the time reached; the number of
+        steps; the largest last term of a signal's polynomial, as a share of the largest that the signal was.
     """
     n, k = len(x0), len(delays)
     indptr, indices, data = unsaturated
@@ -149,13 +74,14 @@ def integrate(
     events, modes, event_count = np.empty(most_events), np.empty(most_events, np.int64), 0
 
     # the sources of the delayed signals, one polynomial a step, the step p at p % room, and where each dead time reads
-    starts, degrees, pieces = np.empty(room), np.empty(room, np.int64), 0
+    starts, radii, degrees, pieces = np.empty(room), np.empty(room), np.empty(room, np.int64), 0
     history = np.empty((room, k, most + 1))
     wrap = room - 1
     cursor, filled = np.zeros(k, np.int64), np.zeros(k, np.int64)
     queue, queued = np.empty(room), 0  # mesh points to come: the images of kinks
 
     z, P, W = np.zeros(ends.shape[2]), np.zeros((1 + k, most + 1)), np.zeros(most + 1)
+    work = np.zeros((2, most + 1))
     U, V = P[0], np.zeros((most + 1, n + 1 + k))
     V[0, :n] = x0
     rest = np.array([times(indptr, indices, data, n + 1 + j, V, 0) for j in range(k)])
@@ -198,18 +124,19 @@ def integrate(
             while cursor[j] + 1 < pieces and starts[(cursor[j] + 1) & wrap] <= middle:
                 cursor[j] += 1
             piece = cursor[j] & wrap
-            if starts[piece] + margin * step + delays[j] < t_next - 1e-9 * step:
-                t_next = starts[piece] + margin * step + delays[j]
+            if starts[piece] + radii[piece] * step + delays[j] < t_next - 1e-9 * step:
+                t_next = starts[piece] + radii[piece] * step + delays[j]
+            radius = min(1.0, (t_next - t) / step + BEYOND)
             degree = degrees[piece]
             for i in range(degree + 1):
                 W[i] = history[piece, j, i]
             moved = start - starts[piece]
             if abs(moved) > 4e-16 * (1.0 + t):  # else the same time, to rounding
-                _shift(W, degree, moved / step)
-            power = margin**degree
+                shift(W, degree, moved / step, work)
+            power = radius**degree
             while degree > 0 and abs(W[degree]) * power <= NEGLIGIBLE * size[1 + j]:
                 degree -= 1
-                power /= margin
+                power /= radius
             for i in range(degree + 1):
                 z[n + 1 + k * i + j] = W[i]
             known, filled[j] = max(known, degree), degree
@@ -218,16 +145,17 @@ def integrate(
         for r in range(n):
             z[r] = x[r]
         z[n] = 0.0 if mode == 0 else (high if mode == 1 else low)
-        columns = -(-(n + 1 + k * (known + 1)) // LANES) * LANES
-        quiet, power = 0, 1.0
+        columns = whole_lanes(n + 1 + k * (known + 1))
+        quiet, power, radius = 0, 1.0, min(1.0, (t_next - t) / step + BEYOND)
         for degree in range(most + 1):
             small = degree > known
+            upto = columns if small else whole_lanes(n + 1 + k * (degree + 1))  # of the causes of this degree
             for s in range(1 + k):
-                c = dot(polynomials, which, signals * degree + s, z, columns)
+                c = dot(polynomials, which, signals * degree + s, z, upto)
                 size[s] = max(size[s], abs(c)) if degree == 0 else size[s]
                 P[s, degree] = c if abs(c) > NOTHING * size[s] else 0.0
                 small = small and abs(c) * power <= NEGLIGIBLE * size[s]
-            power *= margin
+            power *= radius
             quiet = quiet + 1 if small else 0
             if quiet == 2:
                 break
@@ -247,29 +175,20 @@ def integrate(
             if pieces - cursor.min() >= room or queued + k > room:
                 status = CROWDED
                 break
-            starts[piece], degrees[piece] = t, degree
+            starts[piece], radii[piece], degrees[piece] = t, radius, degree
             for j in range(k):
                 for i in range(degree + 1):
                     history[piece, j, i] = P[1 + j, i]
             if kink:  # its images are mesh points, unless the two sides agree as far as they are read
+                left = (pieces - 1) & wrap
                 for j in range(k):
-                    W[:] = 0.0
-                    both = degree
-                    if pieces == 0:
-                        W[0] = rest[j]
-                    else:
-                        left = (pieces - 1) & wrap
-                        before = degrees[left]
+                    W[0], before, moved = rest[j], 0, 0.0
+                    if pieces > 0:
+                        before, moved = degrees[left], (t - starts[left]) / step
                         for i in range(before + 1):
                             W[i] = history[left, j, i]
-                        _shift(W, before, (t - starts[left]) / step)
-                        both = max(before, degree)
-                    gap, power = 0.0, 1.0
-                    for i in range(both + 1):
-                        gap += abs(W[i] - (P[1 + j, i] if i <= degree else 0.0)) * power
-                        power *= 0.5
-                    if gap > NEGLIGIBLE * size[1 + j]:
-                        queued = _insert(queue, queued, t + delays[j])
+                    if gap(W, before, moved, history[piece, j], degree, work) > NEGLIGIBLE * size[1 + j]:
+                        queued = insert(queue, queued, t + delays[j])
                 kink = False
             pieces += 1
 
@@ -281,15 +200,15 @@ def integrate(
                 continue
             sample[g] = until
             for o in range(-1 if g == 0 else groups[g], groups[g + 1]):
-                upto = degree
+                top = degree
                 if o < 0:
                     for i in range(degree + 1):
                         W[i] = U[i]
                 else:
-                    upto = _polynomial(polynomials, which, 1 + k + o, signals, z, columns, known, most, seen, o, W)
+                    top = expand(polynomials, which, 1 + k + o, signals, z, columns, known, most, seen, o, W)
                 for at in range(begin, until):
                     tau, value = (samples[g, at] - t) / step, 0.0
-                    for i in range(upto, -1, -1):
+                    for i in range(top, -1, -1):
                         value = value * tau + W[i]
                     values[1 + o, at] = value
 
@@ -301,7 +220,14 @@ def integrate(
                 for j in range(k):
                     V[i, n + 1 + j] = z[n + 1 + k * i + j]
             V[0, : n + 1] = z[: n + 1]
-            _series(unsaturated if mode == 0 else saturated, V, n, known, most, scale, step, reach, x)
+            driven = 0  # degree to which the delayed signals matter as far as that
+            for j in range(k):
+                top, power = filled[j], reach ** filled[j]
+                while top > driven and abs(z[n + 1 + k * top + j]) * power <= NEGLIGIBLE * size[1 + j]:
+                    top -= 1
+                    power /= reach
+                driven = max(driven, top)
+            advance(unsaturated if mode == 0 else saturated, V, n, driven, most, scale, step, reach, x)
             V[: known + 1, n + 1 :] = 0.0
         for r in range(n):
             scale[r] = max(scale[r], abs(x[r]))

@@ -1,0 +1,348 @@
+/* The algorithm of experiments/taylor.py, propagator.py, mesh.py and crossings.py in plain C: the limit of its speed.
+
+   The tables come from Python, as they do there. References in pieces are left out: the benchmark has none. */
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define ORDER 60
+#define NEGLIGIBLE 1e-14
+#define NOTHING 1e-30
+#define DIVERGENT 1e100
+#define LANES 16
+#define BEYOND 0.5
+#define JUMP 1e-9
+#define MOST 256 /* states, delayed signals and watched signals, each */
+
+typedef struct {
+    const uint32_t *indptr, *indices;
+    const double *data;
+} Sparse;
+
+static double binomial[ORDER + 1][ORDER + 1], factorial[ORDER + 1], inverse[ORDER + 1];
+
+static inline double times(const Sparse *matrix, int r, const double *restrict v) {
+    double value = 0.0;
+    for (uint32_t q = matrix->indptr[r]; q < matrix->indptr[r + 1]; q++)
+        value += matrix->data[q] * v[matrix->indices[q]];
+    return value;
+}
+
+static inline double dot(const double *restrict row, const double *restrict z, int count) {
+    double value = 0.0;
+    for (int c = 0; c < count; c++) value += row[c] * z[c];
+    return value;
+}
+
+static double horner(const double *c, int degree, double tau) {
+    double value = 0.0;
+    for (int i = degree; i >= 0; i--) value = value * tau + c[i];
+    return value;
+}
+
+static void shift(double *restrict c, int degree, double delta) {
+    double derivatives[ORDER + 1], weights[ORDER + 1], power = 1.0;
+    for (int i = 0; i <= degree; i++, power *= delta) {
+        derivatives[i] = factorial[i] * c[i];
+        weights[i] = power * inverse[i];
+    }
+    for (int m = 0; m <= degree; m++) c[m] = dot(derivatives + m, weights, degree + 1 - m) * inverse[m];
+}
+
+static double gap(double *left, int left_degree, double moved, const double *right, int right_degree) {
+    double most = 0.0, power = 1.0;
+    shift(left, left_degree, moved);
+    for (int i = 0; i <= left_degree || i <= right_degree; i++, power *= 0.5)
+        most += fabs((i <= left_degree ? left[i] : 0.0) - (i <= right_degree ? right[i] : 0.0)) * power;
+    return most;
+}
+
+static void advance(const Sparse *restrict matrix, double *restrict V, int stride, int n, int known, int most,
+                    const double *restrict scale, double step, double reach, double *restrict x) {
+    double power = 1.0;
+    memcpy(x, V, n * sizeof *x);
+    for (int i = 0; i < most; i++) {
+        double *now = V + i * stride, *following = now + stride, factor = step / (i + 1);
+        int negligible = i >= known;
+        power *= reach;
+        for (int r = 0; r < n; r++) {
+            double term = factor * times(matrix, r, now);
+            following[r] = term;
+            term *= power;
+            x[r] += term;
+            if (negligible && fabs(term) > NEGLIGIBLE * scale[r]) negligible = 0;
+        }
+        if (negligible) break;
+    }
+}
+
+static int sign_changes(const double *b, int n) {
+    int changes = 0, last = 0;
+    for (int i = 0; i <= n; i++) {
+        int sign = (b[i] > 0) - (b[i] < 0);
+        if (sign) {
+            changes += last && sign != last;
+            last = sign;
+        }
+    }
+    return changes;
+}
+
+static double root(const double *g, int n, double lo, double hi) {
+    double tau = 0.5 * (lo + hi);
+    for (int trial = 0; trial < 200; trial++) {
+        double value = 0.0, slope = 0.0;
+        for (int i = n; i >= 0; i--) {
+            slope = slope * tau + value;
+            value = value * tau + g[i];
+        }
+        if (value > 0) lo = tau; else hi = tau;
+        double next = slope != 0 ? tau - value / slope : 0.5 * (lo + hi);
+        if (!(lo < next && next < hi)) next = 0.5 * (lo + hi);
+        if (fabs(next - tau) <= 1e-16 * (1 + fabs(tau)) || hi - lo <= 1e-16) return next;
+        tau = next;
+    }
+    return tau;
+}
+
+static double first_exit(const double *g, int n, double length) {
+    double slack = g[0], power = 1.0;
+    for (int i = 1; i <= n; i++) {
+        power *= length;
+        slack -= fabs(g[i]) * power;
+    }
+    if (slack > 0) return -1.0;
+    double stack[64][ORDER + 1], left[64], right[64], b[ORDER + 1], first[ORDER + 1];
+    double scaled[ORDER + 1];
+    power = 1.0;
+    for (int i = 0; i <= n; i++, power *= length) scaled[i] = g[i] * power / binomial[i][n];
+    for (int j = 0; j <= n; j++) {
+        double value = 0.0;
+        for (int i = 0; i <= j; i++) value += binomial[i][j] * scaled[i];
+        stack[0][j] = value;
+    }
+    left[0] = 0.0, right[0] = length;
+    for (int depth = 1; depth-- > 0;) {
+        memcpy(b, stack[depth], (n + 1) * sizeof *b);
+        double lo = left[depth], hi = right[depth];
+        int changes = sign_changes(b, n);
+        if (changes == 0) {
+            if (b[0] < 0 || b[n] < 0) return lo;
+            continue;
+        }
+        if (changes == 1 && b[0] >= 0 && b[n] <= 0) return root(g, n, lo, hi);
+        if (hi - lo < 1e-12 * length) {
+            if (b[n] < 0) return lo;
+            continue;
+        }
+        for (int level = 0; level <= n; level++) {
+            first[level] = b[0];
+            for (int j = 0; j < n - level; j++) b[j] = 0.5 * (b[j] + b[j + 1]);
+        }
+        double middle = 0.5 * (lo + hi);
+        memcpy(stack[depth], b, (n + 1) * sizeof *b), left[depth] = middle, right[depth] = hi;
+        memcpy(stack[depth + 1], first, (n + 1) * sizeof *b), left[depth + 1] = lo, right[depth + 1] = middle;
+        depth += 2;
+    }
+    return -1.0;
+}
+
+static double leave(const double *U, int degree, int mode, int on_limit, int stuck, double low, double high,
+                    double reach, int *entered, int *crossed) {
+    double best = -1.0, swing = 0.0, power = 1.0, g[ORDER + 1];
+    *entered = mode, *crossed = 0;
+    for (int i = 1; i <= degree; i++) {
+        power *= reach;
+        swing += fabs(U[i]) * power;
+    }
+    if (!on_limit && ((mode == 1 && U[0] - high > swing) || (mode == -1 && low - U[0] > swing))) return best;
+    if (!on_limit && mode == 0 && high - U[0] > swing && U[0] - low > swing) return best;
+    for (int side = 1; side >= -1; side -= 2) {
+        double limit = side == 1 ? high : low;
+        if (isinf(limit) || (mode && mode != side)) continue;
+        double sign = mode == 0 ? -side : side;
+        for (int i = 0; i <= degree; i++) g[i] = sign * U[i];
+        g[0] -= sign * limit;
+        if (on_limit == side) {
+            for (int i = 0; i < degree; i++) g[i] = g[i + 1];
+            g[degree] = 0.0;
+            if (stuck && g[0] <= 0) continue;
+        }
+        double found = g[0] < 0 ? 0.0 : first_exit(g, degree, reach);
+        if (found >= 0 && (best < 0 || found < best)) {
+            best = found, *entered = mode == 0 ? side : 0;
+            *crossed = -g[0] > JUMP * (fabs(limit) + fabs(U[0])) ? 0 : side;
+        }
+    }
+    return best;
+}
+
+static int insert(double *queue, int queued, double t) {
+    int k = queued;
+    double near = 1e-13 * (1.0 + fabs(t));
+    while (k > 0 && queue[k - 1] > t) k--;
+    if ((k > 0 && t - queue[k - 1] <= near) || (k < queued && queue[k] - t <= near)) return queued;
+    memmove(queue + k + 1, queue + k, (queued - k) * sizeof *queue);
+    queue[k] = t;
+    return queued + 1;
+}
+
+/* The number of events; values (1 + watched, count), events (most_events,). -1: divergence, -2: too little room. */
+int integrate(const uint32_t *indptr, const uint32_t *indices, const double *data, const uint32_t *indptr_m,
+              const uint32_t *indices_m, const double *data_m, const double *ends, const double *polynomials, int n,
+              int k, int watched, int most, int wide, const double *delays, const double *x0, double low, double high,
+              double horizon, double step, const double *samples, const int64_t *groups, int lags,
+              int count, int most_events, int room, double *values, double *events) {
+    const Sparse unsaturated = {indptr, indices, data}, saturated = {indptr_m, indices_m, data_m};
+    int stride = n + 1 + k, signals = 1 + k + watched, pieces = 0, event_count = 0, wrap = room - 1;
+    if (stride > MOST || signals > MOST || most > ORDER) return -2;
+    for (int i = 0; i <= ORDER; i++) /* binomial[i][n] = n over i: rows that run with n */
+        for (int m = 0; m <= ORDER; m++)
+            binomial[i][m] = i == 0 ? 1.0 : m == 0 ? 0.0 : binomial[i - 1][m - 1] + binomial[i][m - 1];
+    for (int i = 0; i <= ORDER; i++) factorial[i] = i ? i * factorial[i - 1] : 1.0, inverse[i] = 1.0 / factorial[i];
+    double *starts = malloc(room * sizeof *starts), *radii = malloc(room * sizeof *radii);
+    double *queue = malloc(room * sizeof *queue);
+    int *degrees = malloc(room * sizeof *degrees), queued = 0, cursor[MOST] = {0}, filled[MOST] = {0};
+    int sample[MOST] = {0};
+    double *history = malloc((size_t)room * k * (most + 1) * sizeof *history);
+#define PIECE(p, j) (history + ((size_t)((p) & wrap) * k + (j)) * (most + 1))
+    double *V = calloc((size_t)(most + 1) * stride, sizeof *V), *z = calloc(wide, sizeof *z), W[ORDER + 1];
+    double P[MOST][ORDER + 1], x[MOST], scale[MOST], size[MOST] = {0}, seen[MOST] = {0}, rest[MOST];
+    memcpy(V, x0, n * sizeof *V);
+    for (int j = 0; j < k; j++) rest[j] = times(&unsaturated, n + 1 + j, V);
+    for (int j = 0; j < k; j++) V[n + 1 + j] = rest[j], size[1 + j] = fabs(rest[j]);
+    for (int r = 0; r < n; r++) x[r] = x0[r], scale[r] = fabs(x0[r]);
+    for (int g = 0; g < lags; g++)
+        for (; sample[g] < count && samples[g * count + sample[g]] < 0; sample[g]++)
+            for (int o = groups[g]; o < groups[g + 1]; o++)
+                values[(1 + o) * count + sample[g]] = times(&unsaturated, n + 1 + k + o, V);
+    double u = times(&unsaturated, n, V), t = 0.0;
+    int mode = u > high ? 1 : u < low ? -1 : 0, kink = 1, on_limit = 0, standing = 0, result = 0;
+
+    while (t < horizon && !result) {
+        double t_next = fmin(t + step, horizon), radius;
+        if (queued && queue[0] - t < step * (1 + 1e-9)) t_next = fmin(queue[0], horizon);
+        int known = 0, degree, quiet = 0;
+        for (int j = 0; j < k; j++) {
+            for (int i = 0; i <= filled[j]; i++) z[n + 1 + k * i + j] = 0.0;
+            filled[j] = 0;
+            double start = t - delays[j], middle = start + 0.5 * (t_next - t);
+            if (middle < 0) {
+                z[n + 1 + j] = rest[j];
+                continue;
+            }
+            while (cursor[j] + 1 < pieces && starts[(cursor[j] + 1) & wrap] <= middle) cursor[j]++;
+            int piece = cursor[j] & wrap;
+            if (starts[piece] + radii[piece] * step + delays[j] < t_next - 1e-9 * step)
+                t_next = starts[piece] + radii[piece] * step + delays[j];
+            degree = degrees[piece];
+            memcpy(W, PIECE(piece, j), (degree + 1) * sizeof *W);
+            double moved = start - starts[piece];
+            if (fabs(moved) > 4e-16 * (1.0 + t)) shift(W, degree, moved / step);
+            radius = fmin(1.0, (t_next - t) / step + BEYOND);
+            double power = pow(radius, degree);
+            for (; degree > 0 && fabs(W[degree]) * power <= NEGLIGIBLE * size[1 + j]; degree--) power /= radius;
+            for (int i = 0; i <= degree; i++) z[n + 1 + k * i + j] = W[i];
+            filled[j] = degree;
+            if (degree > known) known = degree;
+        }
+        const double *end = ends, *polynomial = polynomials;
+        if (mode) end += (size_t)n * wide, polynomial += (size_t)signals * (most + 1) * wide;
+        memcpy(z, x, n * sizeof *z);
+        z[n] = mode == 0 ? 0.0 : mode == 1 ? high : low;
+#define WHOLE_LANES(count) (((count) + LANES - 1) / LANES * LANES)
+        int columns = WHOLE_LANES(n + 1 + k * (known + 1));
+        double power = 1.0;
+        radius = fmin(1.0, (t_next - t) / step + BEYOND);
+        for (degree = 0;; degree++, power *= radius) {
+            int small = degree > known, upto = small ? columns : WHOLE_LANES(n + 1 + k * (degree + 1));
+            for (int s = 0; s <= k; s++) {
+                double c = dot(polynomial + (size_t)(signals * degree + s) * wide, z, upto);
+                if (degree == 0 && fabs(c) > size[s]) size[s] = fabs(c);
+                P[s][degree] = fabs(c) > NOTHING * size[s] ? c : 0.0;
+                small = small && fabs(c) * power <= NEGLIGIBLE * size[s];
+            }
+            quiet = small ? quiet + 1 : 0;
+            if (quiet == 2 || degree == most) break;
+        }
+        int whole = fabs(t_next - t - step) <= 1e-15 * (1.0 + t), entered, crossed;
+        double reach = whole ? 1.0 : (t_next - t) / step;
+        double exit_at = leave(P[0], degree, mode, on_limit, standing > 2, low, high, reach, &entered, &crossed);
+        if (exit_at >= 0) reach = exit_at, t_next = t + exit_at * step;
+
+        if (reach > 0 && k > 0) {
+            int piece = pieces & wrap, left = (pieces - 1) & wrap;
+            for (int j = 0; j < k; j++)
+                if (pieces - cursor[j] >= room || queued + k > room) result = -2;
+            if (result) break;
+            starts[piece] = t, radii[piece] = radius, degrees[piece] = degree;
+            for (int j = 0; j < k; j++) {
+                memcpy(PIECE(piece, j), P[1 + j], (degree + 1) * sizeof(double));
+                if (!kink) continue;
+                int before = pieces ? degrees[left] : 0;
+                double moved = pieces ? (t - starts[left]) / step : 0.0;
+                memcpy(W, pieces ? PIECE(left, j) : rest + j, (before + 1) * sizeof *W);
+                if (gap(W, before, moved, P[1 + j], degree) > NEGLIGIBLE * size[1 + j])
+                    queued = insert(queue, queued, t + delays[j]);
+            }
+            kink = 0;
+            pieces++;
+        }
+        for (int g = 0; g < lags; g++) {
+            const double *at = samples + g * count;
+            int begin = sample[g], until = begin;
+            while (until < count && (at[until] < t_next || t_next >= horizon)) until++;
+            if (until == begin) continue;
+            sample[g] = until;
+            for (int o = g == 0 ? -1 : groups[g]; o < groups[g + 1]; o++) {
+                int top = degree;
+                if (o >= 0) {
+                    int calm = 0;
+                    for (top = 0;; top++) {
+                        W[top] = dot(polynomial + (size_t)(signals * top + 1 + k + o) * wide, z, columns);
+                        seen[o] = fmax(seen[o], fabs(W[top]));
+                        calm = top > known && fabs(W[top]) <= NEGLIGIBLE * seen[o] ? calm + 1 : 0;
+                        if (calm == 2 || top == most) break;
+                    }
+                }
+                for (int s = begin; s < until; s++)
+                    values[(1 + o) * count + s] = horner(o < 0 ? P[0] : W, top, (at[s] - t) / step);
+            }
+        }
+        if (reach == 1.0) {
+            for (int r = 0; r < n; r++) x[r] = dot(end + (size_t)r * wide, z, columns);
+        } else if (reach > 0) {
+            for (int i = 0; i <= known; i++) memcpy(V + i * stride + n + 1, z + n + 1 + k * i, k * sizeof *V);
+            memcpy(V, z, (n + 1) * sizeof *V);
+            int driven = 0;
+            for (int j = 0; j < k; j++) {
+                int top = filled[j];
+                double power = pow(reach, top);
+                for (; top > driven && fabs(z[n + 1 + k * top + j]) * power <= NEGLIGIBLE * size[1 + j]; top--)
+                    power /= reach;
+                if (top > driven) driven = top;
+            }
+            advance(mode ? &saturated : &unsaturated, V, stride, n, driven, most, scale, step, reach, x);
+            for (int i = 0; i <= known; i++) memset(V + i * stride + n + 1, 0, k * sizeof *V);
+        }
+        for (int r = 0; r < n; r++) {
+            scale[r] = fmax(scale[r], fabs(x[r]));
+            if (fabs(x[r]) < NOTHING * scale[r]) x[r] = 0.0;
+            if (!(fabs(x[r]) < DIVERGENT)) result = -1;
+        }
+        standing = reach == 0 ? standing + 1 : 0;
+        t = t_next;
+        on_limit = crossed;
+        if (exit_at >= 0) {
+            if (event_count == most_events) result = -2;
+            else mode = entered, kink = 1, events[event_count++] = t;
+        }
+        int passed = 0;
+        for (; passed < queued && queue[passed] <= t + 1e-13 * (1.0 + t); passed++) kink = 1;
+        queued -= passed;
+        if (passed) memmove(queue, queue + passed, queued * sizeof *queue);
+    }
+    free(starts), free(radii), free(queue), free(degrees), free(history), free(V), free(z);
+    return result ? result : event_count;
+}

@@ -1,0 +1,107 @@
+"""Many closed loops in one call: every plant with every reference, anti-windup and limit, on all cores."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+from tqdm import tqdm
+
+from design.anti_windup import AntiWindup
+from design.contract import Design
+from experiments.closed_loop import DivergenceError, Run, simulate
+from experiments.loops import Controller, plant_loop, realized_controller
+from experiments.scenarios import Reference, SampledReference
+from identification.files import InputError
+from identification.plant import PlantModel
+
+IN_FLIGHT = 4  # runs a worker
+
+
+class Case(NamedTuple):
+    """What was run: the true plant, the reference, the anti-windup's name, and sat to +-limit."""
+
+    plant: PlantModel
+    reference: Reference | SampledReference
+    anti_windup: str
+    limit: float
+
+
+def simulate_many(
+    design: Design,
+    plants: Iterable[PlantModel],
+    references: Sequence[Reference | SampledReference],
+    anti_windups: Mapping[str, AntiWindup | None],
+    limits: Sequence[float],
+    time_s: np.ndarray,
+    workers: int | None = None,
+) -> Iterator[tuple[Case, Run | DivergenceError]]:
+    """Simulate a design around every plant with every reference, anti-windup and limit, from rest.
+
+    Parameters
+    ----------
+    design, time_s
+        As for :func:`experiments.loops.design_loop` and :func:`experiments.closed_loop.simulate`.
+    plants
+        The true plants; may be a generator, from which no more is taken than is run.
+    references, anti_windups, limits
+        r(t); name -> theta1~, None for no anti-windup; positive, the actuator's limits are +-limit.
+    workers
+        Threads; as many as there are cores unless given.
+
+    Yields
+    ------
+    (Case, Run or DivergenceError)
+        In the order of ``itertools.product(plants, references, anti_windups, limits)``, as they are done; a loop that
+        diverges gives the error that :func:`experiments.closed_loop.simulate` raises. No more than :data:`IN_FLIGHT`
+        runs a worker are held at a time. On a terminal a bar counts them.
+
+    Raises
+    ------
+    InputError
+        A limit that is not positive, fewer workers than one, or what :func:`experiments.closed_loop.simulate` refuses.
+
+    Notes
+    -----
+    The integration runs without Python's lock. What is left under it is a tenth of a run, so that threads serve up to
+    some eight cores; a campaign (:mod:`experiments.campaign`) runs in processes, or on a cluster.
+    """
+    if bad := [limit for limit in limits if not limit > 0]:
+        raise InputError(f"a limit is {bad[0]:g}; expected positive numbers")
+    count = os.cpu_count() or 1 if workers is None else workers
+    if count < 1:
+        raise InputError(f"{count} workers are asked for; expected one at least")
+    controllers = {name: realized_controller(design, kind) for name, kind in anti_windups.items()}
+    cases = (Case(plant, *rest) for plant in plants for rest in itertools.product(references, anti_windups, limits))
+    return _streamed(cases, controllers, time_s, count)
+
+
+def _streamed(
+    cases: Iterator[Case], controllers: Mapping[str, Controller], time_s: np.ndarray, workers: int
+) -> Iterator[tuple[Case, Run | DivergenceError]]:
+    def run(case: Case) -> Run | DivergenceError:
+        loop = plant_loop(controllers[case.anti_windup], case.plant, case.reference)
+        try:
+            return simulate(loop, (-case.limit, case.limit), time_s)
+        except DivergenceError as error:
+            return error
+
+    ahead: deque[tuple[Case, Future[Run | DivergenceError]]] = deque()
+    with ThreadPoolExecutor(workers) as pool, tqdm(desc="runs", unit="", disable=None, leave=False) as bar:
+        try:
+            while True:
+                ahead.extend(
+                    (case, pool.submit(run, case)) for case in itertools.islice(cases, IN_FLIGHT * workers - len(ahead))
+                )
+                if not ahead:
+                    return
+                case, future = ahead.popleft()
+                yield case, future.result()
+                bar.update()
+        finally:  # whoever stops taking results stops the runs that have not begun
+            pool.shutdown(wait=False, cancel_futures=True)
