@@ -24,6 +24,15 @@ class StateSpace:
     d: np.ndarray
 
 
+def block_diagonal(*matrices: np.ndarray) -> np.ndarray:
+    """The square matrices along a diagonal, zeros elsewhere: scipy's, without the sixth of a second of its import."""
+    edges = np.cumsum([0, *(len(matrix) for matrix in matrices)])
+    full = np.zeros((edges[-1], edges[-1]))
+    for matrix, first, end in zip(matrices, edges[:-1], edges[1:], strict=True):
+        full[first:end, first:end] = matrix
+    return full
+
+
 def realize(*blocks: Block) -> StateSpace:
     """Realise proper blocks that share one input; poles that they have in common are shared states.
 

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from design.anti_windup import AntiWindup
 from design.block import Block, plant_block
 from design.contract import Design
-from design.realization import StateSpace, realize
+from design.realization import StateSpace, block_diagonal, realize
 from experiments.saturated_loop import SaturatedLoop
 from experiments.scenarios import Generator, PidBenchmark, Reference, SampledReference
 from identification.files import InputError
@@ -137,7 +136,7 @@ def _assemble(
     v_w = forward.d[0] * e_w + np.array([0.0, 0.0, 1.0])
     u_x = v_x - row(theta=theta.C[0])
 
-    A = block_diag(generator.matrix, P.A, forward.A, feedback.A, theta.A)
+    A = block_diagonal(generator.matrix, P.A, forward.A, feedback.A, theta.A)
     D = np.zeros((n, 3))
     A[at_K] += np.outer(forward.b, e_x)
     D[at_K] += np.outer(forward.b, e_w)

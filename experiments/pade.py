@@ -5,10 +5,9 @@ from __future__ import annotations
 from math import comb, factorial
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from design.block import Block
-from design.realization import realize
+from design.realization import block_diagonal, realize
 from experiments.saturated_loop import SaturatedLoop
 
 
@@ -38,7 +37,7 @@ def with_pade(loop: SaturatedLoop, order: int) -> SaturatedLoop:
     n = len(loop.x0)
     filters = {k: realize(pade_block(delay, order)) for k, delay in enumerate(loop.delays) if delay > 0}
     extra = order * len(filters)
-    A = block_diag(loop.A, *(part.A for part in filters.values()))
+    A = block_diagonal(loop.A, *(part.A for part in filters.values()))
     Z = np.hstack([loop.Z, np.zeros((len(loop.delays), extra))])
     # w_k = row_k x for the extended state
     rows = Z.copy()

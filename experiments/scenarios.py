@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag
 
+from design.realization import block_diagonal
 from experiments.saturated_loop import NO_RESETS, Resets
 from identification.files import InputError
 from identification.plant import PlantModel
@@ -94,7 +94,8 @@ class Reference:
 
     def generator(self) -> Generator:
         """Its oscillators, and a constant with its integral."""
-        matrix = block_diag(*(np.array([[0.0, omega], [-omega, 0.0]]) for omega in self.omegas), [[0, 1], [0, 0]])
+        waves = (np.array([[0.0, omega], [-omega, 0.0]]) for omega in self.omegas)
+        matrix = block_diagonal(*waves, np.array([[0.0, 1.0], [0.0, 0.0]]))
         row = [number for amplitude in self.amplitudes for number in (amplitude, 0.0)]
         start = [number for phase in self.phases_rad for number in (math.sin(phase), math.cos(phase))]
         return Generator(matrix, np.array([*row, 1.0, 0.0]), np.array([*start, self.offset, self.slope]), NO_RESETS)
