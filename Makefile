@@ -16,6 +16,7 @@ FIT ?=
 OUT ?= build/refit
 LIMIT ?=
 SETS ?= 200
+PLANTS ?= 200
 REFIT :=
 
 PY := .venv/bin/python
@@ -42,15 +43,16 @@ LIMITS := $(if $(LIMIT),--limit $(LIMIT))
 
 NAMES := $(sort $(basename $(notdir $(wildcard paper_figures/fig_*.py))))
 DATA_NAMES := fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14 fig_4_01 fig_4_02 fig_4_03 fig_4_04 \
-	fig_a_01 fig_a_02 fig_a_03 fig_a_04 fig_a_05
+	fig_a_01 fig_a_02 fig_a_03 fig_a_04 fig_a_05 fig_a_06
 FORMATS := pdf svg png txt
 DESIGNS := $(addprefix $(BUILD)/,design_delay_free.json design_extended.json design_robust.json)
 TABLES := additive_error f_gamma delay_free extended trade_off interpolation robustness limits_delay_free limits_extended \
-	sampled
+	sampled campaign
 
 IDENTIFICATION := $(wildcard identification/*.py)
 CONTRACT := $(addprefix identification/,files.py plant.py model.py thesis.py) $(THESIS)
-ENGINE := $(addprefix experiments/,__main__.py tables.py closed_loop.py taylor.py crossings.py loops.py scenarios.py metrics.py)
+ENGINE := $(addprefix experiments/,__main__.py tables.py closed_loop.py compiled_loop.py saturated_loop.py taylor.py \
+	propagator.py mesh.py crossings.py loops.py scenarios.py metrics.py)
 TRACKING := $(ENGINE) $(addprefix experiments/,tracking.py pade.py)
 
 .PHONY: help figures refit claims test bench study lint clean
@@ -61,8 +63,9 @@ help: ## say what there is
 	@echo 'make refit SWEEPS="a.csv b.mat folder" OUT=mine    from your own sweeps to mine/summary.pdf and mine/figures'
 	@echo 'make refit ... FIT="--modes 1 --bound-order 3"    with options of python -m identification fit'
 	@echo 'make refit ... LIMIT=5    under other saturation limits than the thesis'"'"'s'
+	@echo 'make ... PLANTS=10000         as many plants drawn within W_a, 200 otherwise (Fig. A.6)'
 
-figures: $(foreach format,$(FORMATS),$(NAMES:%=$(FIGURES)/%.$(format))) ## draw the thesis's figures and A.1 to A.5 into build/figures
+figures: $(foreach format,$(FORMATS),$(NAMES:%=$(FIGURES)/%.$(format))) ## draw the thesis's figures and A.1 to A.6 into build/figures
 
 refit: ## fit SWEEPS="a.csv b.csv", design, simulate, draw and sum up for that plant into OUT
 	+@$(MAKE) --no-print-directory REFIT=yes BUILD='$(OUT)' MODEL= SWEEPS='$(SWEEPS)' NAMES='$(DATA_NAMES)' \
@@ -111,7 +114,7 @@ $(if $(MISSING),$(error $(MISSING): no such file; expected sweep files in SWEEPS
 $(if $(SWEEPS),,$(error SWEEPS is empty; expected one or more sweep files))
 ifeq (,$(findstring n,$(filter-out -%,$(firstword $(MAKEFLAGS)))))
 $(shell mkdir -p $(RESULTS) $(FIGURES); \
-	asked() { printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' '$(FIT)' '$(LIMIT)'; $(IN_FOLDERS) | sort; }; \
+	asked() { printf '%s\n' '$(CHOSEN)' '$(SWEEPS)' '$(FIT)' '$(LIMIT)' '$(PLANTS)'; $(IN_FOLDERS) | sort; }; \
 	asked | cmp -s - $(CHOICE) && [ -z "$$($(IN_FOLDERS)$(if $(FOLDERS), -newer $(CHOICE)))" ] || asked > $(CHOICE))
 endif
 endif
@@ -128,7 +131,7 @@ tables = $(addprefix $(RESULTS)/$(1),.csv _summary.csv)
 drawing = $(foreach format,$(FORMATS),$(1:%=$(FIGURES)/%.$(format)))
 
 $(FITTED): $(SWEEP_FILES) $(IDENTIFICATION) $(if $(MODEL),,$(CHOICE)) | $(READY)
-	$(if $(REFIT),@rm -f $@ $(SUMMARY) $(call drawing,$(NAMES)) $(BUILD)/design_* $(TABLES:%=$(RESULTS)/%*))
+	$(if $(REFIT),@rm -rf $@ $(SUMMARY) $(call drawing,$(NAMES)) $(BUILD)/design_* $(TABLES:%=$(RESULTS)/%*))
 	$(PY) -m identification fit $(SWEEPS) $(FIT) --output $@
 
 # Chapter 2 and chapters 3 and 4, with the thesis's references and free parameters.
@@ -193,6 +196,17 @@ $(call tables,sampled) &: $(BUILD)/design_extended.json $(SAMPLED) | $(READY)
 	$(call attempt,$(PY) -m experiments sampled-rates $< $(LIMITS) --output $(RESULTS),$(call tables,sampled),$<,\
 		$(RESULTS)/sampled)
 
+CAMPAIGN := $(RESULTS)/campaign.parquet
+$(CAMPAIGN): $(BUILD)/design_extended.json $(TRACKING) $(addprefix experiments/,uncertain_plants.py additive_distance.py \
+		perturbed_stability.py campaign.py campaign_command.py campaign_file.py campaign_workers.py extended.py delay_free.py) | $(READY)
+	@rm -rf $@.parts
+	$(call attempt,$(PY) -m experiments campaign $< --plants $(PLANTS) --seed 1 $(LIMITS) --output $@,$@,$<,\
+		$(RESULTS)/campaign)
+
+DISTRIBUTIONS := $(call tables,campaign) $(RESULTS)/campaign_distance.csv
+$(DISTRIBUTIONS) &: $(CAMPAIGN) experiments/campaign_tables.py | $(READY)
+	$(call attempt,$(PY) -m experiments campaign-tables $< --output $(RESULTS),$(DISTRIBUTIONS),$<)
+
 $(BUILD)/claims.csv $(BUILD)/claims.txt &: data/thesis/claims.csv $(wildcard experiments/*.py design/*.py) $(CONTRACT) | $(READY)
 	@mkdir -p $(BUILD)
 	$(PY) -m experiments claims --output $(BUILD) > $(BUILD)/claims.txt
@@ -212,12 +226,14 @@ $(eval $(call feeds,robustness,fig_a_03))
 $(eval $(call feeds,limits_delay_free,fig_a_04))
 $(eval $(call feeds,limits_extended,fig_a_04))
 $(eval $(call feeds,sampled,fig_a_05))
+$(eval $(call feeds,campaign,fig_a_06))
+$(call drawing,fig_a_06): $(RESULTS)/campaign_distance.csv
 
 $(call drawing,fig_2_02 fig_2_03 fig_2_04): $(addprefix paper_figures/,pid.py panels.py captions.py)
 $(call drawing,fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14): $(addprefix paper_figures/,panels.py captions.py)
 $(call drawing,fig_2_10 fig_2_11): paper_figures/f_gamma.py
 $(call drawing,fig_4_01 fig_4_02 fig_4_03 fig_4_04): $(addprefix paper_figures/,extended.py panels.py captions.py)
-$(call drawing,fig_a_01 fig_a_02 fig_a_03 fig_a_04 fig_a_05): $(addprefix paper_figures/,panels.py captions.py)
+$(call drawing,fig_a_01 fig_a_02 fig_a_03 fig_a_04 fig_a_05 fig_a_06): $(addprefix paper_figures/,panels.py captions.py)
 
 DIAGRAMS := fig_2_01 fig_2_05 fig_2_06 fig_2_07 fig_2_08 fig_3_01 fig_3_02
 $(call drawing,$(DIAGRAMS)): paper_figures/block_diagrams.py

@@ -1,4 +1,7 @@
-"""Command line of this room: ``simulate`` and ``sampled`` for one run, and one command for each experiment."""
+"""Command line of this room: ``simulate`` and ``sampled`` for one run, and one command for each experiment.
+
+What takes long to import, and only one command needs, that command imports.
+"""
 
 from __future__ import annotations
 
@@ -10,21 +13,16 @@ import pandas as pd
 from tqdm import tqdm
 
 from design.contract import Design, read_design
-from experiments.additive_error import additive_error_tables
-from experiments.claims import read_ledger, recompute
+from experiments.campaign_command import campaign_command
+from experiments.campaign_tables import campaign_tables
 from experiments.delay_free import delay_free_tables
 from experiments.extended import extended_tables
-from experiments.f_gamma import f_gamma_tables
 from experiments.interpolation_regions import interpolation_tables
-from experiments.physical_limits import limits_tables
 from experiments.pid import pid_tables
 from experiments.robustness import robustness_tables
 from experiments.run_commands import DESIGN, positive_limit, sampled_command, simulate_command
-from experiments.sampled_rates import sampled_rates_tables
 from experiments.tables import write_tables
-from experiments.trade_off import RECOVERIES, SECTORS, trade_off_tables
 from identification.files import CommandGroup, InputError
-from identification.frequency_response import read_sweeps
 from identification.model import read_model
 
 OUTPUT_FOLDER = click.option(
@@ -40,6 +38,7 @@ def main() -> None:
 
 main.add_command(simulate_command)
 main.add_command(sampled_command)
+main.add_command(campaign_command)
 
 
 @main.command("pid")
@@ -54,6 +53,8 @@ def pid(output: Path) -> None:
 @OUTPUT_FOLDER
 def f_gamma(design: Path, output: Path) -> None:
     """The parameter study of f(gamma) for the bound of DESIGN: f_gamma.csv, f_gamma_summary.csv."""
+    from experiments.f_gamma import f_gamma_tables
+
     _write(output, f_gamma_tables(read_design(design).additive_bound))
 
 
@@ -62,6 +63,8 @@ def f_gamma(design: Path, output: Path) -> None:
 @OUTPUT_FOLDER
 def trade_off(design: Path, output: Path) -> None:
     """f of the corrected anti-windup over recovery time and sector: trade_off.csv, trade_off_summary.csv."""
+    from experiments.trade_off import RECOVERIES, SECTORS, trade_off_tables
+
     content = read_design(design)
     with tqdm(total=len(SECTORS) * RECOVERIES, desc="trade-off", disable=None, leave=False) as bar:
         _write(output, trade_off_tables(content, bar.update))
@@ -110,6 +113,8 @@ def extended(design: Path, limit: float | None, output: Path) -> None:
 @OUTPUT_FOLDER
 def limits(design: Path, limits: tuple[float, ...], output: Path) -> None:
     """What no controller of DESIGN's plant can better: limits_KIND.csv, limits_KIND_summary.csv (the first LIMIT)."""
+    from experiments.physical_limits import limits_tables
+
     content = read_design(design)
     with tqdm(desc="limits", unit="", disable=None, leave=False) as bar:
         _write(output, limits_tables(content, limits or None, bar.update))
@@ -121,7 +126,17 @@ def limits(design: Path, limits: tuple[float, ...], output: Path) -> None:
 @OUTPUT_FOLDER
 def sampled_rates(design: Path, limit: float | None, output: Path) -> None:
     """The chapter 4 loop on a computer with a real drive, over its rate: sampled.csv, sampled_summary.csv."""
+    from experiments.sampled_rates import sampled_rates_tables
+
     _write(output, sampled_rates_tables(_of_kind(design, "extended"), positive_limit(limit)))
+
+
+@main.command("campaign-tables")
+@click.argument("campaign", type=click.Path(path_type=Path, dir_okay=False))
+@OUTPUT_FOLDER
+def campaign_distributions(campaign: Path, output: Path) -> None:
+    """The distributions of a CAMPAIGN: campaign.csv, campaign_distance.csv, campaign_summary.csv."""
+    _write(output, campaign_tables(campaign))
 
 
 @main.command("additive-error")
@@ -130,6 +145,9 @@ def sampled_rates(design: Path, limit: float | None, output: Path) -> None:
 @OUTPUT_FOLDER
 def additive_error(model: str, sweeps: tuple[Path, ...], output: Path) -> None:
     """The additive error of SWEEPS against MODEL: additive_error.csv, additive_error_summary.csv."""
+    from experiments.additive_error import additive_error_tables
+    from identification.frequency_response import read_sweeps
+
     _write(output, additive_error_tables(read_model(model), read_sweeps(sweeps)))
 
 
@@ -137,6 +155,8 @@ def additive_error(model: str, sweeps: tuple[Path, ...], output: Path) -> None:
 @OUTPUT_FOLDER
 def claims(output: Path) -> None:
     """The numbers that the thesis prints, computed again: claims.csv."""
+    from experiments.claims import read_ledger, recompute
+
     table = recompute(read_ledger())
     _write(output, {"claims": table})
     click.echo(f"{len(table)} printed numbers -> {output / 'claims.csv'}")

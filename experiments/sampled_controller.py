@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
 
 from design.realization import StateSpace
 from identification.files import InputError
@@ -114,5 +113,7 @@ def sample_block(system: StateSpace, delays_s: Sequence[float], sample_time_s: f
 def _held(system: StateSpace, length_s: float) -> tuple[np.ndarray, np.ndarray]:
     """exp(A t) and the integral of exp(A t) b over 0 <= t <= length_s."""
     n = len(system.b)
+    from scipy.linalg import expm  # a sixth of a second, which only sampled runs need
+
     whole = expm(np.block([[system.A, system.b[:, None]], [np.zeros((1, n + 1))]]) * length_s)
     return np.ascontiguousarray(whole[:n, :n]), whole[:n, n].copy()

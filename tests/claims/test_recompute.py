@@ -101,7 +101,7 @@ def test_ledger_with_other_columns_is_refused(tmp_path: Path):
 @pytest.fixture
 def small_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     table = pd.concat([one_row("19.659").assign(status="agrees"), one_row("7.1", "", "K").assign(status="input")])
-    monkeypatch.setattr("experiments.__main__.read_ledger", lambda: table.reset_index(drop=True))
+    monkeypatch.setattr("experiments.claims.read_ledger", lambda: table.reset_index(drop=True))
     return tmp_path
 
 
@@ -115,7 +115,7 @@ def test_command_writes_the_table_and_prints_counts(small_ledger: Path):
 
 
 def test_command_names_the_rows_whose_status_is_out_of_date(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("experiments.__main__.read_ledger", lambda: one_row("19.659").assign(status="differs"))
+    monkeypatch.setattr("experiments.claims.read_ledger", lambda: one_row("19.659").assign(status="differs"))
     result = CliRunner().invoke(main, ["claims", "--output", str(tmp_path)])
     assert result.exit_code == 0
     assert "theta2.gain: the ledger says differs, recomputed it agrees" in result.output

@@ -10,13 +10,14 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
 from identification.files import InputError
 from paper_figures import __main__ as command_line
-from paper_figures import captions, fig_2_12, fig_a_05, panels, style
+from paper_figures import captions, fig_2_12, fig_a_05, fig_a_06, panels, style
 from paper_figures.__main__ import figure_module
 
 Tables = dict[str, pd.DataFrame]
@@ -111,7 +112,31 @@ def sampled_tables() -> Tables:
     return {"sampled": pd.DataFrame(columns), "sampled_summary": summary.assign(**facts)}
 
 
+def campaign_tables() -> Tables:
+    """Of every run the last 30 plants of 120 diverge; with the thesis's anti-windup none recovers."""
+    parts, distances, rows = [], [], []
+    share = np.arange(1, 121) / 120
+    for k, run in enumerate(("none", "thesis", "corrected"), start=1):
+        values = np.where(share <= 0.75, share, np.nan)
+        part = {"peak_error": 40 + 50 * k * values, "steady_error": 10 ** (k + 8 * values - 8)}
+        part["recovery_s"] = 3 * k + 2 * values if run != "thesis" else np.nan
+        parts.append(pd.DataFrame({"run": run, "share": share} | part))
+        tenths = np.arange(10) / 10
+        linear = np.where(tenths == 0.2, np.nan, 1 - tenths)  # no plant in the third bin
+        distance = {"run": run, "from": tenths, "to": tenths + 0.1, "plants": np.where(tenths == 0.2, 0, 13)}
+        distances.append(pd.DataFrame(distance | {"linear_stable": linear, "diverged": 0.25, "recovered": linear / k}))
+        row = {"run": run, "plants": 120, "seed": 17, "limit": 13.5, "horizon_s": 21.25, "linear_stable": 0.625}
+        row |= {"diverged": 0.25, "recovered": 0.75 - k / 8, "steady_error_50": 10.0 ** (k - 4)}
+        rows.append(row | {"recovery_50_s": 3 * k + 1 if run != "thesis" else np.nan})
+    return {
+        "campaign": pd.concat(parts, ignore_index=True),
+        "campaign_summary": pd.DataFrame(rows),
+        "campaign_distance": pd.concat(distances, ignore_index=True),
+    }
+
+
 TABLES = {
+    "campaign": campaign_tables,
     "limits_extended": limits_tables,
     "sampled": sampled_tables,
     "pid": pid_tables,
@@ -162,7 +187,7 @@ PANELS = {
         signals(signal, run) for run in ("thesis", "corrected") for signal in ("control", "saturated", "control")
     ],
 }
-NAMES = [*PANELS, "fig_2_09", "fig_2_10", "fig_2_11", "fig_a_04", "fig_a_05"]
+NAMES = [*PANELS, "fig_2_09", "fig_2_10", "fig_2_11", "fig_a_04", "fig_a_05", "fig_a_06"]
 CONTROL_PANELS = [
     *(("fig_2_02", 1, "swapped_none"), ("fig_2_03", 3, "printed_back_calculation")),
     *(("fig_2_13", 0, "thesis"), ("fig_2_13", 1, "corrected"), ("fig_4_04", 2, "thesis"), ("fig_4_04", 5, "corrected")),
@@ -351,6 +376,10 @@ SAID = {
     "fig_4_04": ["limit", "last_saturation_s"],
     "fig_a_04": ["limit"],
     "fig_a_05": ["limit", "quantum", "full_range_s", "root", "period_s", "steady_error", "settling_s"],
+    "fig_a_06": [
+        *("plants", "seed", "limit", "horizon_s", "linear_stable", "diverged", "recovered"),
+        *("steady_error_50", "recovery_50_s"),
+    ],
 }
 
 
@@ -506,6 +535,74 @@ def test_a_drive_that_diverges_is_named(saved):
     assert len(saved(figure, "fig_a_05", fig_a_05.caption(tables))) == 4
 
 
+def at(line: tuple[np.ndarray, np.ndarray], values: np.ndarray) -> np.ndarray:
+    """What a line of steps shows right of each value."""
+    x, y = line
+    return y[np.searchsorted(x, values, side="right") - 1]
+
+
+def test_the_campaign():
+    tables = campaign_tables()
+    table, distance = tables["campaign"], tables["campaign_distance"]
+    peak, steady, recovery, over_distance = lettered(fig_a_06.draw(tables))
+    for panel, measure in ((peak, "peak_error"), (steady, "steady_error"), (recovery, "recovery_s")):
+        low, high = panel.get_xlim()
+        for run in fig_a_06.RUNS:
+            rows = table[table["run"] == run.name].dropna(subset=measure)
+            (line,) = of_kind(panel, run.kind)
+            assert line[0][[0, -1]].tolist() == [low, high]
+            assert (np.diff(line[0]) >= 0).all()
+            assert (np.diff(line[1]) >= 0).all()
+            assert line[1][[0, -1]].tolist() == [0.0, 0.75 if len(rows) else 0.0]
+            np.testing.assert_array_equal(at(line, rows[measure]), rows["share"])
+    assert (peak.get_xscale(), steady.get_xscale(), recovery.get_xscale()) == ("linear", "log", "linear")
+    assert peak.get_xlim()[0] < 40 + 50 / 120
+    assert recovery.get_xlim()[0] == 0
+    for run in fig_a_06.RUNS:
+        (steps,) = (
+            patch
+            for patch in over_distance.patches
+            if to_hex(patch.get_edgecolor()) == style.LINES[run.kind]["color"].lower()
+        )
+        rows = distance[distance["run"] == run.name]
+        np.testing.assert_array_equal(steps.get_data().values, rows["recovered"])
+        np.testing.assert_array_equal(steps.get_data().edges, np.append(rows["from"], 1.0))
+    caption = fig_a_06.caption(tables)
+    for said in (
+        "SYNTHETIC: 120 plants that we drew (seed 17)",
+        "under the limits +-13.5, for 21.2 s",
+        "no more than 0.12.",  # sqrt(log(40)/240)
+        "Without anti-windup 62.5 % recover, half of all within 4 s, 25 % diverge",
+        "with the thesis's 50 % recover, 25 % diverge, and the median of the last period's error is 0.01;",
+        "is stable (62.5 % of all)",
+    ):
+        assert said in caption
+
+
+def test_a_campaign_in_which_nothing_recovers_and_all_diverges(saved):
+    tables = campaign_tables()
+    measures = ["peak_error", "steady_error", "recovery_s"]
+    tables["campaign"]["recovery_s"] = np.nan
+    figure = fig_a_06.draw(tables)
+    assert len(saved(figure, "fig_a_06", fig_a_06.caption(tables))) == 4
+    tables["campaign"][measures] = np.nan
+    tables["campaign_summary"][["steady_error_50", "recovery_50_s"]] = np.nan
+    caption = fig_a_06.caption(tables)
+    assert "is unbounded" in caption
+    assert len(saved(fig_a_06.draw(tables), "fig_a_06", caption)) == 4
+
+
+def test_a_campaign_of_equal_or_vanishing_errors(saved):
+    tables = campaign_tables()
+    tables["campaign"]["peak_error"] = 50.0
+    tables["campaign"]["steady_error"] = 0.0
+    figure = fig_a_06.draw(tables)
+    for panel in lettered(figure)[:2]:
+        low, high = panel.get_xlim()
+        assert low < high
+    assert len(saved(figure, "fig_a_06", fig_a_06.caption(tables))) == 4
+
+
 @pytest.mark.parametrize("name", ["fig_2_13", "fig_4_01", "fig_4_02", "fig_4_03", "fig_4_04"])
 def test_caption_says_whose_the_limits_are(name):
     tables = tables_of(name)
@@ -613,7 +710,9 @@ def test_no_text_overlaps_another_and_all_is_on_the_page(name, extents):
 def test_keys_stand_clear_of_the_data(name, extents):
     figure = figure_module(name).draw(tables_of(name))
     extents(figure, texts)
-    for panel in figure.axes:
+    keys = [panel for panel in figure.axes if panel.get_legend()]
+    assert keys
+    for panel in keys:
         assert panel.get_legend().get_window_extent().y0 >= panel.get_window_extent().y1
 
 

@@ -22,7 +22,10 @@ if [ -e "$here/$command.crashes" ]; then echo "Traceback of $command" >&2; exit 
 echo "$*" >> "$here/log"
 case $room in
 identification | design) touch "$output" ;;
-experiments) name=${command//-/_}
+experiments)
+    [ $command != campaign ] || { touch "$output"; exit; }
+    name=${command//-/_}
+    [ $command != campaign-tables ] || { name=campaign; touch "$output/campaign_distance.csv"; }
     [ $command != limits ] || name=limits_$(basename "$4" .json | sed s/design_//)
     [ $command != sampled-rates ] || name=sampled
     [ $command != interpolation ] || touch "$output/interpolation_map.csv"
@@ -87,6 +90,7 @@ def test_a_refused_design_takes_only_what_hangs_on_it(make: Make, tmp_path: Path
     gone = everything - built(tmp_path)
     assert gone == {
         *("design_extended.json", "design_robust.json", "results/interpolation_map.csv"),
+        *("results/campaign.parquet", "results/campaign_distance.csv"),
         *(
             f"results/{name}{part}.csv"
             for name in (
@@ -97,12 +101,13 @@ def test_a_refused_design_takes_only_what_hangs_on_it(make: Make, tmp_path: Path
                 "robustness",
                 "limits_extended",
                 "sampled",
+                "campaign",
             )
             for part in ("", "_summary")
         ),
         *(
             f"figures/fig_{n}.{kind}"
-            for n in ("2_10", "2_11", "4_01", "4_02", "4_03", "4_04", "a_01", "a_02", "a_03", "a_04", "a_05")
+            for n in ("2_10", "2_11", "4_01", "4_02", "4_03", "4_04", "a_01", "a_02", "a_03", "a_04", "a_05", "a_06")
             for kind in ("pdf", "txt")
         ),
     }
@@ -122,6 +127,18 @@ def test_a_refused_simulation_leaves_its_design(make: Make, tmp_path: Path) -> N
     (tmp_path / "extended.refuses").touch()
     assert make("refit", "FIT=--modes 1").returncode == 0
     assert "results/f_gamma.refused.txt" not in built(tmp_path)
+
+
+def test_a_refused_campaign_has_no_tables_and_an_old_one_is_not_gone_on_with(make: Make, tmp_path: Path) -> None:
+    (tmp_path / "campaign.refuses").touch()
+    parts = tmp_path / "mine" / "results" / "campaign.parquet.parts"
+    parts.mkdir(parents=True)
+    (parts / "manifest.json").touch()
+    assert make("refit").returncode == 0
+    names = built(tmp_path)
+    assert {"results/campaign.refused.txt", "figures/fig_a_05.pdf", "summary.pdf"} <= names
+    assert not any("fig_a_06" in name or name.startswith("results/campaign.parquet") for name in names)
+    assert not names & {"results/campaign.csv", "results/campaign_distance.csv", "results/campaign_summary.csv"}
 
 
 def test_a_crash_is_no_refusal(make: Make, tmp_path: Path) -> None:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from click.testing import CliRunner
 from pytest_regressions.file_regression import FileRegressionFixture
 from strict import Strict
 
 from design.contract import Design
 from design.extended import design_extended
+from experiments.__main__ import main
 from experiments.additive_error import additive_error_tables
+from experiments.campaign_tables import campaign_tables
 from experiments.delay_free import delay_free_tables
 from experiments.extended import extended_tables
 from experiments.f_gamma import f_gamma_tables
@@ -27,8 +31,9 @@ from identification.thesis import DATA
 from paper_figures.__main__ import figure_module, figure_names
 
 LOOPS = ("pid", "delay_free", "extended", "sampled")
-EXPERIMENTS = (*LOOPS, "additive_error", "f_gamma", "trade_off", "interpolation", "robustness")
-TABLES = [*(f"{name}{part}" for name in EXPERIMENTS for part in ("", "_summary")), "interpolation_map"]
+EXPERIMENTS = (*LOOPS, "additive_error", "f_gamma", "trade_off", "interpolation", "robustness", "campaign")
+TABLES = [*(f"{name}{part}" for name in EXPERIMENTS for part in ("", "_summary"))]
+TABLES += ["interpolation_map", "campaign_distance"]
 MOST_ROWS = 120
 # The ends of their intervals are as exact as the intervals are narrow; tests/unit/test_physical_limits.py holds them.
 ENCLOSED = {f"limits_{kind}{part}" for kind in ("delay_free", "extended") for part in ("", "_summary")}
@@ -40,7 +45,19 @@ def sweeps() -> tuple[object, ...]:
 
 
 @pytest.fixture(scope="module")
-def tables(extended_design: Design, delay_free_design: Design) -> dict[str, pd.DataFrame]:
+def campaign(extended_design: Design, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of a small campaign."""
+    folder = tmp_path_factory.mktemp("campaign")
+    design, output = folder / "design.json", folder / "campaign.parquet"
+    design.write_text(extended_design.to_json(), encoding="utf-8")
+    arguments = ["campaign", str(design), "--plants", "40", "--seed", "1", "--output", str(output)]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.output
+    return output
+
+
+@pytest.fixture(scope="module")
+def tables(extended_design: Design, delay_free_design: Design, campaign: Path) -> dict[str, pd.DataFrame]:
     implied = read_model("implied")
     chosen = extended_design.parameters
     robust = design_extended(implied, extended_design.reference_omegas, chosen["a"], chosen["pairs"], robust_level=0.9)
@@ -53,6 +70,7 @@ def tables(extended_design: Design, delay_free_design: Design) -> dict[str, pd.D
         | trade_off_tables(extended_design)
         | interpolation_tables(extended_design)
         | sampled_rates_tables(extended_design)
+        | campaign_tables(campaign)
         | robustness_tables({"design_extended": extended_design, "design_robust": robust})
     )
 

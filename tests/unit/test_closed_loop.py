@@ -147,6 +147,15 @@ def test_pid_loop_settles_on_its_step() -> None:
     assert run.control[-1] == pytest.approx(10.0 / 1.5, abs=1e-6)  # static gain
 
 
+def test_a_loop_that_has_decayed_holds_zeros() -> None:
+    # exp(-40 t) is a subnormal number from t = 17.7 s on
+    loop = scalar_loop(-40.0, 0.0, 0.1, 1.0)
+    t = np.linspace(0.0, 40.0, 401)
+    x = simulate(loop, FREE, t).outputs["x"]
+    np.testing.assert_allclose(x, np.exp(-40 * t), rtol=0, atol=1e-14)
+    assert np.all(x[t > 2.0] == 0.0)
+
+
 def test_divergence_is_said() -> None:
     with pytest.raises(DivergenceError, match="diverges"):
         simulate(scalar_loop(40.0, 0.0, 0.1, 1.0), FREE, np.array([0.0, 10.0]))

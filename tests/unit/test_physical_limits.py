@@ -372,7 +372,7 @@ def test_command_line(extended_design: Design, tmp_path: Path, monkeypatch: pyte
         asked.append((design.kind, limits))
         return {"limits_extended": pd.DataFrame({"limit": [2.0]}), "limits_extended_summary": pd.DataFrame({"a": [1]})}
 
-    monkeypatch.setattr("experiments.__main__.limits_tables", found)
+    monkeypatch.setattr("experiments.physical_limits.limits_tables", found)
     path = tmp_path / "design.json"
     path.write_text(extended_design.to_json(), encoding="utf-8")
     command = ["limits", str(path), "--output", str(tmp_path)]

@@ -1,0 +1,220 @@
+"""The Monte Carlo campaign: plants inside the additive bound, each run without and with the two anti-windups."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from design.contract import Design
+from experiments import delay_free, extended
+from experiments.closed_loop import DivergenceError, simulate
+from experiments.extended import limit_for_last_saturation
+from experiments.loops import Controller, design_loop, plant_loop, realized_controller
+from experiments.metrics import last_saturation, settling_time
+from experiments.perturbed_stability import PerturbedLoop
+from experiments.scenarios import Reference, thesis_reference
+from experiments.tracking import SETTLED, compensators, span
+from experiments.uncertain_plants import PlantsWithin
+from identification.files import InputError
+from identification.plant import PlantModel
+from identification.thesis import printed
+
+SAMPLES_PER_PERIOD = 500
+CHUNK = 25  # plants that one task runs
+
+Columns = dict[str, list[Any]]
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What every chunk of a campaign shares.
+
+    Parameters
+    ----------
+    design
+        The design; campaigns are told apart by its hash.
+    design_sha256
+        Of design.json.
+    seed
+        Not negative.
+    limit
+        Saturation limits +-limit.
+    """
+
+    design: Design = field(compare=False)
+    design_sha256: str
+    seed: int
+    limit: float
+
+    @property
+    def reference(self) -> Reference:
+        """The thesis's reference at the design's frequencies."""
+        return thesis_reference(self.design.kind, self.design.reference_omegas)
+
+    @property
+    def periods(self) -> int:
+        """Length of a run in :attr:`span_s`, as in the design kind's own experiment."""
+        return extended.PERIODS if self.design.kind == "extended" else delay_free.PERIODS
+
+    @property
+    def span_s(self) -> float:
+        """What counts as a period, in seconds, see :func:`experiments.tracking.span`."""
+        return span(self.design, self.reference)
+
+    @property
+    def horizon_s(self) -> float:
+        """Length of a run in seconds."""
+        return self.periods * self.span_s
+
+
+def usual_limit(design: Design) -> float:
+    """The limit that the design kind's own experiment takes: the printed one, or the one found from the thesis's words.
+
+    Raises
+    ------
+    InputError
+        There is none, see :func:`experiments.extended.limit_for_last_saturation`.
+    """
+    if design.kind == "delay-free":
+        return float(printed()["delay_free"]["limit"])
+    reference = thesis_reference("extended", design.reference_omegas)
+    target = float(printed()["extended"]["desaturation_s"])
+    horizon = max(extended.PERIODS * span(design, reference), extended.PERIODS * target)
+    required = reference.required(design.loop_plant)
+    return limit_for_last_saturation(design_loop(design, reference, None), target, required, horizon)
+
+
+def run_chunk(campaign: Campaign, first: int, last: int) -> Columns:
+    """Draw and run the plants ``first`` to ``last`` - 1, the same whatever the chunk, the process and the machine.
+
+    Parameters
+    ----------
+    campaign
+        What they share.
+    first, last
+        Numbers of plants, the first one 0.
+
+    Returns
+    -------
+    dict
+        Three rows a plant, as columns:
+
+        plant, anti_windup, distance
+            The number, none or thesis or corrected, and the largest |P_true - P|/|W_a|.
+        linear_stable
+            Whether the loop without saturation is, see :class:`experiments.perturbed_stability.PerturbedLoop`.
+        diverged
+            Whether a signal of the run passed 1e100; then the numbers below are None.
+        peak_error
+            The largest |error| after the first quarter of the period: the loop starts from rest, and before that the
+            error is the reference itself, whatever the controller.
+        steady_error
+            The largest |error| of the last period.
+        recovery_s
+            The time from which on |error| stays within 1 % of the reference's amplitude; None if that is not so all
+            through the last period.
+        last_saturation_s
+            Exact; None if it saturates to the end.
+        events
+            How often the control crosses a limit.
+        gain, delay_s, zero_omega_1, zero_zeta_1, ..., real_zero_1, ...
+            The true plant.
+
+    Raises
+    ------
+    InputError
+        A plant cannot be drawn or a loop not be simulated; the sentence names the plant.
+
+    Notes
+    -----
+    The errors are those at 500 samples a period. The runs start from rest and follow the thesis's reference.
+    """
+    prepared = _prepared(campaign)
+    columns: Columns = {}
+    for index in range(first, last):
+        try:
+            rows = prepared.rows(index)
+        except InputError as error:
+            raise InputError(f"plant {index} of seed {campaign.seed}: {error}") from None
+        for row in rows:
+            for name, value in row.items():
+                columns.setdefault(name, []).append(value)
+    return columns
+
+
+@lru_cache(maxsize=2)
+def _prepared(campaign: Campaign) -> _Runner:
+    return _Runner(campaign)
+
+
+class _Runner:
+    """What is computed once for all plants of a campaign."""
+
+    def __init__(self, campaign: Campaign) -> None:
+        self.campaign, design = campaign, campaign.design
+        self.plants = PlantsWithin(design.loop_plant, design.additive_bound)
+        self.loop = PerturbedLoop(design)
+        kinds = compensators(design)
+        self.controllers = {name: realized_controller(design, kind) for name, kind in kinds.items()}
+        self.reference = campaign.reference
+        samples = campaign.periods * SAMPLES_PER_PERIOD + 1
+        self.time_s = np.linspace(0.0, campaign.horizon_s, samples)
+        self.early = SAMPLES_PER_PERIOD // 4  # samples before the peak counts
+
+    def rows(self, index: int) -> list[dict[str, Any]]:
+        member = self.plants.draw(self.campaign.seed, index)
+        stable = self.loop.unstable_roots(member.plant) == 0
+        numbers = parameters(member.plant)
+        return [
+            {"plant": index, "anti_windup": name, "distance": member.distance, "linear_stable": stable}
+            | self._metrics(member.plant, controller)
+            | numbers
+            for name, controller in self.controllers.items()
+        ]
+
+    def _metrics(self, plant: PlantModel, controller: Controller) -> dict[str, Any]:
+        loop = plant_loop(controller, plant, self.reference)
+        loop = replace(loop, outputs={"error": loop.outputs["error"]})  # the others need not be read
+        limit = self.campaign.limit
+        try:
+            run = simulate(loop, (-limit, limit), self.time_s)
+        except DivergenceError:
+            return {"diverged": True} | dict.fromkeys(
+                ("peak_error", "steady_error", "recovery_s", "last_saturation_s", "events")
+            )
+        error = np.abs(run.outputs["error"])
+        band, steady = SETTLED * self.reference.amplitude, float(error[-SAMPLES_PER_PERIOD - 1 :].max())
+        recovery = _number(settling_time(self.time_s, error, band)) if steady <= band else None
+        return {
+            "diverged": False,
+            "peak_error": float(error[self.early :].max()),
+            "steady_error": steady,
+            "recovery_s": recovery,
+            "last_saturation_s": _number(last_saturation(run)),
+            "events": len(run.events_s),
+        }
+
+
+def parameters(plant: PlantModel) -> dict[str, float]:
+    """The numbers of a plant, named: gain, delay_s, zero_omega_1, zero_zeta_1, ..., real_zero_1, ..."""
+    modes = {"zero": plant.zero_modes, "pole": plant.pole_modes}
+    rates = {"real_zero": plant.real_zeros, "real_pole": plant.real_poles}
+    return {"gain": plant.gain, "delay_s": plant.delay_s} | dict(
+        chain(
+            (
+                (f"{name}_{what}_{k}", float(getattr(mode, what)))
+                for name, of in modes.items()
+                for k, mode in enumerate(of, start=1)
+                for what in ("omega", "zeta")
+            ),
+            ((f"{name}_{k}", rate) for name, of in rates.items() for k, rate in enumerate(of, start=1)),
+        )
+    )
+
+
+def _number(value: float) -> float | None:
+    return None if np.isnan(value) else float(value)

@@ -1,0 +1,85 @@
+"""The command ``campaign``: many plants inside the additive bound, here or on a cluster."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import click
+import numpy as np
+import pandas as pd
+from tqdm import tqdm
+
+from design.contract import read_design
+from experiments.campaign_tables import PERCENT, campaign_tables
+from experiments.run_commands import DESIGN, positive_limit
+from identification.files import InputError, read_bytes
+
+MOST_PLANTS = 10**9
+
+
+@click.command("campaign")
+@DESIGN
+@click.option("--plants", type=int, required=True, help="How many plants.")
+@click.option("--seed", type=int, required=True, help="Of the random numbers; plant i is the same in every campaign.")
+@click.option("--limit", type=float, help="Saturation limits +-LIMIT, instead of the thesis's.")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on the Dask cluster with this scheduler, not here.")
+@click.option("--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Parquet file to write.")
+def campaign_command(
+    design: Path, plants: int, seed: int, limit: float | None, scheduler: str | None, output: Path
+) -> None:
+    """Run DESIGN with plants drawn inside W_a: three rows a plant, none, thesis and corrected.
+
+    Interrupted, the same command goes on from what is done.
+    """
+    from experiments.campaign import Campaign, usual_limit
+    from experiments.campaign_file import CampaignFile
+    from experiments.campaign_workers import run_here, run_on_cluster
+
+    if not (1 <= plants <= MOST_PLANTS and seed >= 0):
+        raise InputError(
+            f"--plants is {plants} and --seed {seed}; expected 1 to {MOST_PLANTS} plants, a seed from 0 on"
+        )
+    content = read_design(design)
+    limit = usual_limit(content) if positive_limit(limit) is None else limit
+    assert limit is not None
+    campaign = Campaign(content, hashlib.sha256(read_bytes(design)).hexdigest(), seed, limit)
+    file = CampaignFile(output, campaign, plants, design)
+    missing = file.missing
+    left = sum(last - first for first, last in missing)
+    if left < plants:
+        click.echo(f"{plants - left} of {plants} plants are there already", err=True)
+    if missing:
+        done = run_here(campaign, missing) if scheduler is None else run_on_cluster(campaign, missing, scheduler)
+        try:
+            with tqdm(total=plants, initial=plants - left, desc="campaign", unit=" plants", disable=None) as bar:
+                for chunk, columns in done:
+                    file.keep(chunk, columns)
+                    bar.update(chunk[1] - chunk[0])
+        except KeyboardInterrupt:
+            kept = plants - sum(last - first for first, last in file.missing)
+            click.echo(f"{kept} of {plants} plants are kept in {file.folder}; the same command goes on", err=True)
+            raise
+        finally:
+            done.close()
+    file.finish()
+    click.echo(f"{plants} plants within W_a -> {output}; limits +-{limit:.6g}, {campaign.horizon_s:.6g} s each")
+    for line in _lines(campaign_tables(output)["campaign_summary"]):
+        click.echo(line)
+
+
+def _lines(summary: pd.DataFrame) -> list[str]:
+    """The summary as a table."""
+    shares = {"linear_stable": "stable", "diverged": "diverged", "recovered": "recovered"}
+    measures = {"peak_error_{}": "peak error", "steady_error_{}": "last period", "recovery_{}_s": "recovery s"}
+    heads = [f"{label:>11s}" for label in shares.values()]
+    lines = ["".join([" " * 10, *heads, *(f"{f'{label}, 5 50 95 %':>30s}" for label in measures.values())])]
+    for row in summary.to_dict("records"):
+        cells = [f"{row['run']:10s}", *(f"{row[name]:11.2%}" for name in shares)]
+        cells += [f"{_number(row[form.format(percent)]):>10s}" for form in measures for percent in PERCENT]
+        lines.append("".join(cells))
+    return lines
+
+
+def _number(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.4g}"

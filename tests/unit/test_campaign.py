@@ -1,0 +1,292 @@
+"""The campaign: stability against counted roots, rows against single runs, and one file whatever happens on the way."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from threading import Thread
+
+import numpy as np
+import psutil
+import pytest
+from click.testing import CliRunner, Result
+from pyarrow import parquet
+
+from design.contract import Design
+from design.quasi_polynomial import roots_right_of
+from design.robustness import delay_loop
+from experiments import campaign_file
+from experiments.__main__ import main
+from experiments.campaign import Campaign, run_chunk
+from experiments.closed_loop import simulate
+from experiments.loops import design_loop
+from experiments.perturbed_stability import PerturbedLoop
+from experiments.scenarios import thesis_reference
+from experiments.uncertain_plants import PlantsWithin
+from identification.files import InputError
+from identification.plant import Mode, PlantModel
+
+ROOT = Path(__file__).resolve().parents[2]
+PLANTS, LIMIT = 24, 12.0
+ARGUMENTS = ["--plants", str(PLANTS), "--seed", "1", "--limit", str(LIMIT)]
+
+
+def far_from(plant: PlantModel, random: np.random.Generator) -> PlantModel:
+    """A plant that no bound of use would cover, with the same integrator."""
+
+    def moved(modes: tuple[Mode, ...]) -> tuple[Mode, ...]:
+        return tuple(
+            Mode(mode.omega * np.exp(0.4 * random.normal()), mode.zeta * np.exp(random.normal())) for mode in modes
+        )
+
+    corner = np.exp(random.uniform(0, 7))
+    return replace(
+        plant,
+        zero_modes=moved(plant.zero_modes),
+        pole_modes=moved(plant.pole_modes),
+        delay_s=plant.delay_s + random.exponential(0.05),
+        real_zeros=(corner,),
+        real_poles=(corner * np.exp(random.normal()),),
+    )
+
+
+@pytest.mark.parametrize("name", ["extended_design", "delay_free_design"])
+def test_the_winding_number_counts_the_unstable_roots(name: str, request: pytest.FixtureRequest) -> None:
+    design: Design = request.getfixturevalue(name)
+    random, loop = np.random.default_rng(3), PerturbedLoop(design)
+    found = []
+    for _ in range(100):
+        true = far_from(design.loop_plant, random)
+        found.append(loop.unstable_roots(true))
+        assert found[-1] == roots_right_of(delay_loop(design, true), 0.0)
+    assert len(set(found)) >= 4
+    assert min(found) == 0
+    assert loop.unstable_roots(design.loop_plant) == 0
+
+
+def test_an_unstable_linear_loop_is_one_in_time(extended_design: Design) -> None:
+    """Without limits it grows; a dead time beyond the audit's margin of 129.4 ms."""
+    loop, plant = PerturbedLoop(extended_design), extended_design.loop_plant
+    reference = thesis_reference("extended", extended_design.reference_omegas)
+    for delay_s, unstable in ((0.125, False), (0.135, True)):
+        true = replace(plant, delay_s=delay_s)
+        assert (loop.unstable_roots(true) > 0) == unstable
+        run = simulate(
+            design_loop(extended_design, reference, None, true), (-np.inf, np.inf), np.linspace(0.0, 60.0, 3001)
+        )
+        late, later = (np.abs(run.outputs["error"][part]).max() for part in (slice(1000, 2000), slice(2000, None)))
+        assert (later > late) == unstable
+
+
+def test_another_integrator_is_refused(extended_design: Design) -> None:
+    loop, plant = PerturbedLoop(extended_design), extended_design.loop_plant
+    for true in (replace(plant, gain=1.01 * plant.gain), replace(plant, integrators=2)):
+        with pytest.raises(InputError, match="integrators differ"):
+            loop.unstable_roots(true)
+
+
+@pytest.fixture(scope="module")
+def campaign(extended_design: Design) -> Campaign:
+    return Campaign(extended_design, "of a test", 1, LIMIT)
+
+
+def test_rows_are_those_of_single_runs(campaign: Campaign, extended_design: Design) -> None:
+    columns = run_chunk(campaign, 3, 4)
+    plant = PlantsWithin(extended_design.loop_plant, extended_design.additive_bound).draw(1, 3)
+    assert columns["plant"] == [3, 3, 3]
+    assert columns["anti_windup"] == ["none", "thesis", "corrected"]
+    assert columns["distance"] == [plant.distance] * 3
+    assert columns["delay_s"] == [plant.plant.delay_s] * 3
+    assert columns["pole_zeta_2"] == [plant.plant.pole_modes[1].zeta] * 3
+    stable = roots_right_of(delay_loop(extended_design, plant.plant), 0.0) == 0
+    assert columns["linear_stable"] == [stable] * 3
+    period = 2 * np.pi / 1.5
+    time_s = np.linspace(0.0, 5 * period, 2501)
+    assert campaign.horizon_s == pytest.approx(5 * period)
+    for row, name in enumerate(columns["anti_windup"]):
+        kind = None if name == "none" else extended_design.compensator(name)
+        loop = design_loop(extended_design, campaign.reference, kind, plant.plant)
+        run = simulate(loop, (-LIMIT, LIMIT), time_s)
+        error = np.abs(run.outputs["error"])
+        assert columns["peak_error"][row] == pytest.approx(error[time_s >= 0.249 * period].max(), rel=1e-9)
+        assert columns["steady_error"][row] == pytest.approx(error[time_s >= 3.999 * period].max(), rel=1e-9)
+        assert columns["events"][row] == len(run.events_s)
+        recovery = columns["recovery_s"][row]
+        if recovery is None:
+            assert columns["steady_error"][row] > 0.5
+        else:
+            assert error[time_s >= recovery].max() <= 0.5 < error[time_s < recovery][-1]
+
+
+def test_a_plant_is_the_same_in_every_chunk(campaign: Campaign) -> None:
+    together, apart = run_chunk(campaign, 4, 6), [run_chunk(campaign, index, index + 1) for index in (5, 4)]
+    assert together == {name: apart[1][name] + apart[0][name] for name in together}
+
+
+def test_a_run_that_diverges_is_a_result(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    from experiments import campaign as module
+
+    def diverges(*_: object) -> None:
+        raise module.DivergenceError(1.0)
+
+    monkeypatch.setattr(module, "simulate", diverges)
+    columns = run_chunk(campaign, 0, 1)
+    assert columns["diverged"] == [True] * 3
+    for name in ("peak_error", "steady_error", "recovery_s", "last_saturation_s", "events"):
+        assert columns[name] == [None] * 3
+
+
+def test_a_chapter_2_design_runs_too(delay_free_design: Design) -> None:
+    """No dead time in its loop: that of the true plant may only grow."""
+    campaign = Campaign(delay_free_design, "another", 2, 10.0)
+    columns = run_chunk(campaign, 1, 2)
+    assert columns["delay_s"][0] >= 0
+    assert columns["zero_omega_1"][0] != delay_free_design.plant.zero_modes[0].omega
+    assert campaign.horizon_s == pytest.approx(24.0)
+
+
+@pytest.fixture
+def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(campaign_file, "CHUNK", 2)
+
+
+@pytest.fixture(scope="module")
+def folder(extended_design: Design, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("campaign")
+    (folder / "design.json").write_text(extended_design.to_json(), encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def whole(folder: Path) -> bytes:
+    """The file of a campaign that ran here without interruption."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(campaign_file, "CHUNK", 2)
+        result = run(folder, "whole.parquet")
+    assert result.exit_code == 0, result.output
+    assert "24 plants within W_a ->" in result.stdout
+    assert [line.split()[0] for line in result.stdout.splitlines()[-3:]] == ["none", "thesis", "corrected"]
+    return (folder / "whole.parquet").read_bytes()
+
+
+def run(folder: Path, output: str, *arguments: str) -> Result:
+    command = ["campaign", str(folder / "design.json"), *ARGUMENTS, "--output", str(folder / output), *arguments]
+    return CliRunner().invoke(main, command)
+
+
+def wait_for_parts(folder: Path, count: int) -> None:
+    deadline = time.monotonic() + 30
+    while len(list(folder.glob("part-*.parquet"))) < count and time.monotonic() < deadline:
+        time.sleep(0.01)
+
+
+def test_the_file(folder: Path, whole: bytes, extended_design: Design) -> None:
+    file = parquet.ParquetFile(folder / "whole.parquet")
+    table = file.read().to_pandas()
+    assert list(table["plant"]) == [index for index in range(PLANTS) for _ in range(3)]
+    assert set(table["distance"].between(0, 1)) == {True}
+    said = {key.decode(): value.decode() for key, value in file.schema_arrow.metadata.items()}
+    assert said["plants"] == str(PLANTS)
+    assert said["limit"] == str(LIMIT)
+    assert said["design"] == "design.json"
+    assert "not measured" in said["synthetic"]
+    assert float(said["horizon_s"]) == pytest.approx(10 * np.pi / 1.5)
+    assert not (folder / "whole.parquet.parts").exists()
+
+
+@pytest.mark.usefixtures("small_chunks")
+def test_a_killed_command_goes_on(folder: Path, whole: bytes) -> None:
+    parts = folder / "resumed.parquet.parts"
+    code = (
+        "from experiments import campaign_file; campaign_file.CHUNK = 2; from experiments.__main__ import main; main()"
+    )
+    command = ["campaign", str(folder / "design.json"), *ARGUMENTS, "--output", str(folder / "resumed.parquet")]
+    with subprocess.Popen([sys.executable, "-c", code, *command], cwd=ROOT) as process:
+        wait_for_parts(parts, 2)
+        workers = psutil.Process(process.pid).children(recursive=True)
+        process.kill()
+    psutil.wait_procs(workers, timeout=10)
+    assert not any(worker.is_running() for worker in workers)
+    there = 2 * len(list(parts.glob("part-*.parquet")))
+    assert 0 < there < PLANTS
+
+    refused = run(folder, "resumed.parquet", "--seed", "2")
+    assert refused.exit_code == 2
+    assert "parts of another campaign, seed 1 and not 2; give the same command to go on" in refused.stderr
+    manifest = parts / "manifest.json"
+    known = manifest.read_text(encoding="utf-8")
+    facts = json.loads(known)
+    manifest.write_text(json.dumps(facts | {"versions": facts["versions"] | {"numpy": "1.0"}}), encoding="utf-8")
+    refused = run(folder, "resumed.parquet")
+    assert refused.exit_code == 2
+    assert f"versions numpy 1.0 and not numpy {np.__version__};" in refused.stderr
+    manifest.write_text(known, encoding="utf-8")
+    assert 2 * len(list(parts.glob("part-*.parquet"))) == there
+
+    result = run(folder, "resumed.parquet")
+    assert result.exit_code == 0, result.output
+    assert f"{there} of {PLANTS} plants are there already" in result.stderr
+    assert (folder / "resumed.parquet").read_bytes() == whole
+    assert not parts.exists()
+
+
+@pytest.mark.usefixtures("small_chunks")
+def test_a_cluster_that_loses_a_worker_writes_the_same_file(folder: Path, whole: bytes) -> None:
+    from distributed import LocalCluster
+
+    parts = folder / "cluster.parquet.parts"
+    with LocalCluster(
+        n_workers=2, processes=True, threads_per_worker=1, dashboard_address=None, silence_logs="CRITICAL"
+    ) as cluster:
+
+        def lose_one() -> None:
+            wait_for_parts(parts, 3)
+            lost.append(len(list(parts.glob("part-*.parquet"))))
+            os.kill(cluster.workers[0].pid, signal.SIGKILL)
+
+        lost: list[int] = []
+        thread = Thread(target=lose_one)
+        thread.start()
+        result = run(folder, "cluster.parquet", "--scheduler", cluster.scheduler_address)
+        thread.join()
+    assert result.exit_code == 0, result.output
+    assert 3 <= lost[0] < PLANTS // 2
+    assert (folder / "cluster.parquet").read_bytes() == whole
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["--plants", "0"], "--plants is 0"),
+        (["--seed", "-1"], "--seed -1"),
+        (["--limit", "-3"], "--limit is -3"),
+        (["--scheduler", "nonsense"], "--scheduler nonsense: no Dask scheduler answers there"),
+        (["--scheduler", "foo://host:1"], "no Dask scheduler answers there"),
+        (["--output", "nowhere/campaign.parquet"], "nowhere: no such folder"),
+    ],
+)
+def test_refusals(folder: Path, arguments: list[str], part: str) -> None:
+    before = sorted(path.name for path in folder.iterdir())
+    result = run(folder, "refused.parquet", *arguments)
+    assert result.exit_code == 2, result.output
+    assert part in result.stderr
+    assert sorted(path.name for path in folder.iterdir()) == before
+
+
+def test_a_design_is_not_written_over_and_a_strangers_folder_not_touched(folder: Path) -> None:
+    result = run(folder, "design.json")
+    assert result.exit_code == 2
+    assert "is an input too" in result.stderr
+    stranger = folder / "mine.parquet.parts"
+    stranger.mkdir()
+    (stranger / "letter.txt").write_text("dear", encoding="utf-8")
+    result = run(folder, "mine.parquet")
+    assert result.exit_code == 2
+    assert "is not the folder of a campaign" in result.stderr
+    assert [path.name for path in stranger.iterdir()] == ["letter.txt"]
