@@ -190,7 +190,7 @@ static int insert(double *queue, int queued, double t) {
 
 /* The number of events; values (1 + watched, count), events (most_events,). -1: divergence, -2: too little room. */
 int integrate(const uint32_t *indptr, const uint32_t *indices, const double *data, const uint32_t *indptr_m,
-              const uint32_t *indices_m, const double *data_m, const double *ends, const double *polynomials, int n,
+              const uint32_t *indices_m, const double *data_m, const double *increments, const double *polynomials, int n,
               int k, int watched, int most, int wide, const double *delays, const double *x0, double low, double high,
               double horizon, double step, const double *samples, const int64_t *groups, int lags,
               int count, int most_events, int room, double *values, double *events) {
@@ -202,6 +202,7 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
             binomial[i][m] = i == 0 ? 1.0 : m == 0 ? 0.0 : binomial[i - 1][m - 1] + binomial[i][m - 1];
     for (int i = 0; i <= ORDER; i++) factorial[i] = i ? i * factorial[i - 1] : 1.0, inverse[i] = 1.0 / factorial[i];
     double *starts = malloc(room * sizeof *starts), *radii = malloc(room * sizeof *radii);
+    double *lates = malloc(room * sizeof *lates), late = 0.0;
     double *queue = malloc(room * sizeof *queue);
     int *degrees = malloc(room * sizeof *degrees), queued = 0, cursor[MOST] = {0}, filled[MOST] = {0};
     int sample[MOST] = {0};
@@ -238,7 +239,7 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
                 t_next = starts[piece] + radii[piece] * step + delays[j];
             degree = degrees[piece];
             memcpy(W, PIECE(piece, j), (degree + 1) * sizeof *W);
-            double moved = start - starts[piece];
+            double moved = start - starts[piece] + (late - lates[piece]);
             if (fabs(moved) > 4e-16 * (1.0 + t)) shift(W, degree, moved / step);
             radius = fmin(1.0, (t_next - t) / step + BEYOND);
             double power = pow(radius, degree);
@@ -247,8 +248,8 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
             filled[j] = degree;
             if (degree > known) known = degree;
         }
-        const double *end = ends, *polynomial = polynomials;
-        if (mode) end += (size_t)n * wide, polynomial += (size_t)signals * (most + 1) * wide;
+        const double *increment = increments, *polynomial = polynomials;
+        if (mode) increment += (size_t)n * wide, polynomial += (size_t)signals * (most + 1) * wide;
         memcpy(z, x, n * sizeof *z);
         z[n] = mode == 0 ? 0.0 : mode == 1 ? high : low;
 #define WHOLE_LANES(count) (((count) + LANES - 1) / LANES * LANES)
@@ -267,21 +268,25 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
             if (quiet == 2 || degree == most) break;
         }
         int whole = fabs(t_next - t - step) <= 1e-15 * (1.0 + t), entered, crossed;
-        double reach = whole ? 1.0 : (t_next - t) / step;
+        double reach = whole ? 1.0 : fmax((t_next - t - late) / step, 0.0), late_next = 0.0;
         double exit_at = leave(P[0], degree, mode, on_limit, standing > 2, low, high, reach, &entered, &crossed);
-        if (exit_at >= 0) reach = exit_at, t_next = t + exit_at * step;
+        if (exit_at >= 0 || whole) {
+            reach = exit_at >= 0 ? exit_at : 1.0;
+            t_next = t + (late + reach * step);
+            late_next = (late + reach * step) - (t_next - t);
+        }
 
         if (reach > 0 && k > 0) {
             int piece = pieces & wrap, left = (pieces - 1) & wrap;
             for (int j = 0; j < k; j++)
                 if (pieces - cursor[j] >= room || queued + k > room) result = -2;
             if (result) break;
-            starts[piece] = t, radii[piece] = radius, degrees[piece] = degree;
+            starts[piece] = t, lates[piece] = late, radii[piece] = radius, degrees[piece] = degree;
             for (int j = 0; j < k; j++) {
                 memcpy(PIECE(piece, j), P[1 + j], (degree + 1) * sizeof(double));
                 if (!kink) continue;
                 int before = pieces ? degrees[left] : 0;
-                double moved = pieces ? (t - starts[left]) / step : 0.0;
+                double moved = pieces ? (t - starts[left] + (late - lates[left])) / step : 0.0;
                 memcpy(W, pieces ? PIECE(left, j) : rest + j, (before + 1) * sizeof *W);
                 if (gap(W, before, moved, P[1 + j], degree) > NEGLIGIBLE * size[1 + j])
                     queued = insert(queue, queued, t + delays[j]);
@@ -307,11 +312,11 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
                     }
                 }
                 for (int s = begin; s < until; s++)
-                    values[(1 + o) * count + s] = horner(o < 0 ? P[0] : W, top, (at[s] - t) / step);
+                    values[(1 + o) * count + s] = horner(o < 0 ? P[0] : W, top, (at[s] - t - late) / step);
             }
         }
         if (reach == 1.0) {
-            for (int r = 0; r < n; r++) x[r] = dot(end + (size_t)r * wide, z, columns);
+            for (int r = 0; r < n; r++) x[r] += dot(increment + (size_t)r * wide, z, columns);
         } else if (reach > 0) {
             for (int i = 0; i <= known; i++) memcpy(V + i * stride + n + 1, z + n + 1 + k * i, k * sizeof *V);
             memcpy(V, z, (n + 1) * sizeof *V);
@@ -332,7 +337,7 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
             if (!(fabs(x[r]) < DIVERGENT)) result = -1;
         }
         standing = reach == 0 ? standing + 1 : 0;
-        t = t_next;
+        t = t_next, late = late_next;
         on_limit = crossed;
         if (exit_at >= 0) {
             if (event_count == most_events) result = -2;
@@ -343,6 +348,6 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
         queued -= passed;
         if (passed) memmove(queue, queue + passed, queued * sizeof *queue);
     }
-    free(starts), free(radii), free(queue), free(degrees), free(history), free(V), free(z);
+    free(starts), free(lates), free(radii), free(queue), free(degrees), free(history), free(V), free(z);
     return result ? result : event_count;
 }

@@ -94,7 +94,7 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
         values, events, modes, status, end, _, tail = taylor.integrate(
             compiled.unsaturated,
             compiled.saturated,
-            compiled.ends,
+            compiled.increments,
             compiled.polynomials,
             compiled.delays,
             compiled.x0,

@@ -18,7 +18,7 @@ class CompiledLoop:
 
     Parameters
     ----------
-    unsaturated, saturated, ends, polynomials, delays, x0, step, groups
+    unsaturated, saturated, increments, polynomials, delays, x0, step, groups
         As there.
     lags
         Shape (g,): how much earlier each group is sampled, in seconds; zero first.
@@ -28,7 +28,7 @@ class CompiledLoop:
 
     unsaturated: Rows
     saturated: Rows
-    ends: np.ndarray
+    increments: np.ndarray
     polynomials: np.ndarray
     delays: np.ndarray
     x0: np.ndarray
@@ -69,7 +69,7 @@ def compile_loop(loop: SaturatedLoop, most_step: float = np.inf) -> CompiledLoop
     return CompiledLoop(
         unsaturated=unsaturated,
         saturated=saturated,
-        ends=_stacked([ends for ends, _, _ in tables]),
+        increments=_stacked([increments for increments, _, _ in tables]),
         polynomials=_stacked([polynomials for _, polynomials, _ in tables]),
         delays=delays,
         x0=loop.x0,

@@ -80,10 +80,10 @@ def tabulate(rows: Rows, n: int, k: int, step: float) -> tuple[Array, Array, int
 
     Returns
     -------
-    ends (n, columns), polynomials (signals (degree + 1), columns), degree
-        Both times z = (x_0, m, w_0, w_1, ..., w_degree) are x at the step's end and the signals' coefficients, those
-        of degree 0 first. Beyond ``degree`` each entry's terms are below rounding; -1 where they are not at the
-        highest.
+    increments (n, columns), polynomials (signals (degree + 1), columns), degree
+        Both times z = (x_0, m, w_0, w_1, ..., w_degree) are what x gains in the step, and the signals' coefficients,
+        those of degree 0 first. Beyond ``degree`` each entry's terms are below rounding; -1 where they are not at the
+        highest. The gain and not the end: its entries' rounding, the same at every step, is small where x is slow.
     """
     indptr, indices, data = rows
     columns, signals = n + 1 + k, len(indptr) - 1 - n
@@ -91,7 +91,7 @@ def tabulate(rows: Rows, n: int, k: int, step: float) -> tuple[Array, Array, int
     responses, outputs = np.zeros((MOST + 1, columns, columns)), np.zeros((MOST + 1, signals, columns))
     largest = np.zeros((n, columns))
     for r in range(n):
-        responses[0, r, r] = largest[r, r] = 1.0
+        responses[0, r, r] = 1.0
     degree = -1
     for p in range(MOST + 1):
         if p > 0:
@@ -121,14 +121,14 @@ def tabulate(rows: Rows, n: int, k: int, step: float) -> tuple[Array, Array, int
                 elif p == 0:
                     outputs[p, s, column] += value
     wide = n + 1 + k * (degree + 1)
-    ends, polynomials = np.zeros((n, wide)), np.zeros((signals * (degree + 1), wide))
-    for p in range(degree + 1):
+    increments, polynomials = np.zeros((n, wide)), np.zeros((signals * (degree + 1), wide))
+    for p in range(degree, -1, -1):  # the small terms first
         for r in range(n):
-            for c in range(n + 1):
-                ends[r, c] += responses[p, r, c]
+            for c in range(n + 1 if p > 0 else 0):
+                increments[r, c] += responses[p, r, c]
             for i in range(p):
                 for j in range(k):
-                    ends[r, n + 1 + k * i + j] += responses[p - i, r, n + 1 + j] / BINOMIAL[p, i]
+                    increments[r, n + 1 + k * i + j] += responses[p - i, r, n + 1 + j] / BINOMIAL[p, i]
         for s in range(signals):
             row = signals * p + s
             for c in range(n + 1):
@@ -136,7 +136,7 @@ def tabulate(rows: Rows, n: int, k: int, step: float) -> tuple[Array, Array, int
             for i in range(p + 1):
                 for j in range(k):
                     polynomials[row, n + 1 + k * i + j] = outputs[p - i, s, n + 1 + j] / BINOMIAL[p, i]
-    return ends, polynomials, degree
+    return increments, polynomials, degree
 
 
 @njit(cache=True, nogil=True)

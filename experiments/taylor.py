@@ -30,8 +30,8 @@ COMPLETE, DIVERGED, ENDLESS, CROWDED = 0, 1, 2, 3
 
 @njit(cache=True, nogil=True)
 def integrate(
-    unsaturated: Rows, saturated: Rows, ends: Array, polynomials: Array, delays: Array, x0: Array, reset_times: Array,
-    resets: Array, low: float, high: float, horizon: float, step: float, samples: Array,
+    unsaturated: Rows, saturated: Rows, increments: Array, polynomials: Array, delays: Array, x0: Array,
+    reset_times: Array, resets: Array, low: float, high: float, horizon: float, step: float, samples: Array,
     groups: Array, most_steps: int, most_events: int, room: int,
 ) -> tuple[Array, Array, Array, int, float, int, float]:  # fmt: skip
     """Integrate one loop from rest of its delayed signals, w_j(t < 0) = Z_j x0.
@@ -43,7 +43,7 @@ def integrate(
         [Z 0 0], and o rows [. 0 0] of what is watched.
     saturated
         The same with n rows [A B D].
-    ends, polynomials
+    increments, polynomials
         Tables of the two, see :func:`experiments.propagator.tabulate`: shapes (2, n, c), (2, (1 + k + o)(d + 1), c).
     delays, x0
         Shapes (k,), (n,); delays positive.
@@ -74,13 +74,13 @@ def integrate(
     events, modes, event_count = np.empty(most_events), np.empty(most_events, np.int64), 0
 
     # the sources of the delayed signals, one polynomial a step, the step p at p % room, and where each dead time reads
-    starts, radii, degrees, pieces = np.empty(room), np.empty(room), np.empty(room, np.int64), 0
+    starts, lates, radii, degrees, pieces = np.empty(room), np.empty(room), np.empty(room), np.empty(room, np.int64), 0
     history = np.empty((room, k, most + 1))
     wrap = room - 1
     cursor, filled = np.zeros(k, np.int64), np.zeros(k, np.int64)
     queue, queued = np.empty(room), 0  # mesh points to come: the images of kinks
 
-    z, P, W = np.zeros(ends.shape[2]), np.zeros((1 + k, most + 1)), np.zeros(most + 1)
+    z, P, W = np.zeros(increments.shape[2]), np.zeros((1 + k, most + 1)), np.zeros(most + 1)
     work = np.zeros((2, most + 1))
     U, V = P[0], np.zeros((most + 1, n + 1 + k))
     V[0, :n] = x0
@@ -98,7 +98,7 @@ def integrate(
             for o in range(groups[g], groups[g + 1]):
                 values[1 + o, sample[g]] = times(indptr, indices, data, n + 1 + k + o, V, 0)
             sample[g] += 1
-    t, reset, status, steps = 0.0, 0, COMPLETE, 0
+    t, late, reset, status, steps = 0.0, 0.0, 0, COMPLETE, 0  # the time is t + late: thousands of steps do not drift
 
     while t < horizon:
         if steps == most_steps:
@@ -130,7 +130,7 @@ def integrate(
             degree = degrees[piece]
             for i in range(degree + 1):
                 W[i] = history[piece, j, i]
-            moved = start - starts[piece]
+            moved = start - starts[piece] + (late - lates[piece])
             if abs(moved) > 4e-16 * (1.0 + t):  # else the same time, to rounding
                 shift(W, degree, moved / step, work)
             power = radius**degree
@@ -164,18 +164,22 @@ def integrate(
                 last[s] = max(last[s], abs(P[s, most]) * power)
 
         whole = abs(t_next - t - step) <= 1e-15 * (1.0 + t)
-        reach = 1.0 if whole else (t_next - t) / step
+        if reset < len(reset_times) and t_next == reset_times[reset]:
+            whole = False  # it ends there to the last digit
+        reach = 1.0 if whole else max((t_next - t - late) / step, 0.0)
         exit_at, entered, crossed = leave(U, degree, mode, on_limit, standing > 2, low, high, reach)
-        if exit_at >= 0:
-            reach = exit_at
-            t_next = t + exit_at * step
+        late_next = 0.0
+        if exit_at >= 0 or whole:
+            reach = exit_at if exit_at >= 0 else 1.0
+            t_next = t + (late + reach * step)
+            late_next = (late + reach * step) - (t_next - t)
 
         if reach > 0 and k > 0:
             piece = pieces & wrap
             if pieces - cursor.min() >= room or queued + k > room:
                 status = CROWDED
                 break
-            starts[piece], radii[piece], degrees[piece] = t, radius, degree
+            starts[piece], lates[piece], radii[piece], degrees[piece] = t, late, radius, degree
             for j in range(k):
                 for i in range(degree + 1):
                     history[piece, j, i] = P[1 + j, i]
@@ -184,7 +188,7 @@ def integrate(
                 for j in range(k):
                     W[0], before, moved = rest[j], 0, 0.0
                     if pieces > 0:
-                        before, moved = degrees[left], (t - starts[left]) / step
+                        before, moved = degrees[left], (t - starts[left] + (late - lates[left])) / step
                         for i in range(before + 1):
                             W[i] = history[left, j, i]
                     if gap(W, before, moved, history[piece, j], degree, work) > NEGLIGIBLE * size[1 + j]:
@@ -207,14 +211,14 @@ def integrate(
                 else:
                     top = expand(polynomials, which, 1 + k + o, signals, z, columns, known, most, seen, o, W)
                 for at in range(begin, until):
-                    tau, value = (samples[g, at] - t) / step, 0.0
+                    tau, value = (samples[g, at] - t - late) / step, 0.0
                     for i in range(top, -1, -1):
                         value = value * tau + W[i]
                     values[1 + o, at] = value
 
         if reach == 1.0:
             for r in range(n):
-                x[r] = dot(ends, which, r, z, columns)
+                x[r] += dot(increments, which, r, z, columns)
         elif reach > 0:
             for i in range(known + 1):
                 for j in range(k):
@@ -236,7 +240,7 @@ def integrate(
             if not abs(x[r]) < DIVERGENT:
                 status = DIVERGED
         standing = standing + 1 if reach == 0 else 0
-        t = t_next
+        t, late = t_next, late_next
         if status == DIVERGED:
             break
 

@@ -35,15 +35,15 @@ def test_a_tabulated_step_is_the_matrix_exponential_and_the_integral(seed: int) 
     random = np.random.default_rng(100 + seed)
     x0, m, w = random.standard_normal(n), 0.7, random.standard_normal((4, k))
     rows = compressed(np.vstack([np.hstack([A, B[:, None], D]), signals]))
-    ends, polynomials, degree = tabulate(rows, n, k, STEP)
-    z = z_of(x0, m, w, ends.shape[1])
+    increments, polynomials, degree = tabulate(rows, n, k, STEP)
+    z = z_of(x0, m, w, increments.shape[1])
 
     def right_side(t: float, x: np.ndarray) -> np.ndarray:
         return A @ x + B * m + D @ sum(c * (t / STEP) ** i for i, c in enumerate(w))
 
     exact = solve_ivp(right_side, (0, STEP), x0, method="DOP853", rtol=1e-13, atol=1e-13, dense_output=True)
     scale = np.abs(exact.y).max()
-    np.testing.assert_allclose(ends @ z, exact.y[:, -1], rtol=0, atol=1e-11 * scale)
+    np.testing.assert_allclose(x0 + increments @ z, exact.y[:, -1], rtol=0, atol=1e-11 * scale)
     coefficients = (polynomials @ z).reshape(degree + 1, len(signals))
     for tau in (0.0, 0.35, 1.0):
         x, now = exact.sol(tau * STEP), sum(c * tau**i for i, c in enumerate(w))
@@ -51,7 +51,8 @@ def test_a_tabulated_step_is_the_matrix_exponential_and_the_integral(seed: int) 
         found = sum(c * tau**i for i, c in enumerate(coefficients))
         np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-10 * scale)
     # a free system alone: the exponential to rounding
-    np.testing.assert_allclose(ends[:, :n], expm(A * STEP), rtol=0, atol=1e-13 * np.abs(expm(A * STEP)).max())
+    free = expm(A * STEP)
+    np.testing.assert_allclose(np.eye(n) + increments[:, :n], free, rtol=0, atol=1e-13 * np.abs(free).max())
 
 
 @pytest.mark.parametrize("reach", [0.1, 0.8, 1.0])
@@ -67,16 +68,16 @@ def test_a_cut_step_is_the_tabulated_one_of_its_length(reach: float) -> None:
     V[0, :n], V[0, n] = x0, m
     V[:3, n + 1 :] = w
     advance(rows, V, n, 2, 40, np.ones(n), STEP, reach, x)
-    np.testing.assert_allclose(x, shorter @ z_of(x0, m, scaled, shorter.shape[1]), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(x, x0 + shorter @ z_of(x0, m, scaled, shorter.shape[1]), rtol=0, atol=1e-12)
 
 
 def test_integrators_that_only_delayed_signals_drive_are_tabulated_to_a_high_degree() -> None:
     # x' = w has no response of its own beyond degree one, yet w may be of any degree
     rows = compressed(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]))
-    ends, _, degree = tabulate(rows, 1, 1, 2.0)
+    increments, _, degree = tabulate(rows, 1, 1, 2.0)
     assert degree >= 20
     # the last one's integral is of one degree more, which the table ends before
-    np.testing.assert_allclose(ends[0, 2:-1], 2.0 / np.arange(1, degree + 1), rtol=1e-15)
+    np.testing.assert_allclose(increments[0, 2:-1], 2.0 / np.arange(1, degree + 1), rtol=1e-15)
 
 
 def test_a_series_that_does_not_end_is_said() -> None:
