@@ -178,9 +178,8 @@ static double leave(const double *U, int degree, int mode, int on_limit, int stu
     return best;
 }
 
-static int insert(double *queue, int queued, double t) {
+static int insert(double *queue, int queued, double t, double near) {
     int k = queued;
-    double near = 1e-13 * (1.0 + fabs(t));
     while (k > 0 && queue[k - 1] > t) k--;
     if ((k > 0 && t - queue[k - 1] <= near) || (k < queued && queue[k] - t <= near)) return queued;
     memmove(queue + k + 1, queue + k, (queued - k) * sizeof *queue);
@@ -240,7 +239,7 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
             degree = degrees[piece];
             memcpy(W, PIECE(piece, j), (degree + 1) * sizeof *W);
             double moved = start - starts[piece] + (late - lates[piece]);
-            if (fabs(moved) > 4e-16 * (1.0 + t)) shift(W, degree, moved / step);
+            if (fabs(moved) > 4e-16 * (step + t)) shift(W, degree, moved / step);
             radius = fmin(1.0, (t_next - t) / step + BEYOND);
             double power = pow(radius, degree);
             for (; degree > 0 && fabs(W[degree]) * power <= NEGLIGIBLE * size[1 + j]; degree--) power /= radius;
@@ -267,7 +266,7 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
             quiet = small ? quiet + 1 : 0;
             if (quiet == 2 || degree == most) break;
         }
-        int whole = fabs(t_next - t - step) <= 1e-15 * (1.0 + t), entered, crossed;
+        int whole = fabs(t_next - t - step) <= 1e-15 * (step + t), entered, crossed;
         double reach = whole ? 1.0 : fmax((t_next - t - late) / step, 0.0), late_next = 0.0;
         double exit_at = leave(P[0], degree, mode, on_limit, standing > 2, low, high, reach, &entered, &crossed);
         if (exit_at >= 0 || whole) {
@@ -289,7 +288,7 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
                 double moved = pieces ? (t - starts[left] + (late - lates[left])) / step : 0.0;
                 memcpy(W, pieces ? PIECE(left, j) : rest + j, (before + 1) * sizeof *W);
                 if (gap(W, before, moved, P[1 + j], degree) > NEGLIGIBLE * size[1 + j])
-                    queued = insert(queue, queued, t + delays[j]);
+                    queued = insert(queue, queued, t + delays[j], 1e-13 * (step + t));
             }
             kink = 0;
             pieces++;
@@ -344,7 +343,7 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
             else mode = entered, kink = 1, events[event_count++] = t;
         }
         int passed = 0;
-        for (; passed < queued && queue[passed] <= t + 1e-13 * (1.0 + t); passed++) kink = 1;
+        for (; passed < queued && queue[passed] <= t + 1e-13 * (step + t); passed++) kink = 1;
         queued -= passed;
         if (passed) memmove(queue, queue + passed, queued * sizeof *queue);
     }

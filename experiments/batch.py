@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from design.anti_windup import AntiWindup
 from design.contract import Design
-from experiments.closed_loop import DivergenceError, Run, simulate
+from experiments.closed_loop import Run, simulate
 from experiments.loops import Controller, plant_loop, realized_controller
 from experiments.scenarios import Reference, SampledReference
 from identification.files import InputError
@@ -40,7 +40,7 @@ def simulate_many(
     limits: Sequence[float],
     time_s: np.ndarray,
     workers: int | None = None,
-) -> Iterator[tuple[Case, Run | DivergenceError]]:
+) -> Iterator[tuple[Case, Run | InputError]]:
     """Simulate a design around every plant with every reference, anti-windup and limit, from rest.
 
     Parameters
@@ -56,21 +56,22 @@ def simulate_many(
 
     Yields
     ------
-    (Case, Run or DivergenceError)
+    (Case, Run or InputError)
         In the order of ``itertools.product(plants, references, anti_windups, limits)``, as they are done; a loop that
-        diverges gives the error that :func:`experiments.closed_loop.simulate` raises. No more than :data:`IN_FLIGHT`
-        runs a worker are held at a time. On a terminal a bar counts them.
+        diverges or is refused gives the error that :func:`experiments.closed_loop.simulate` raises. No more than
+        :data:`IN_FLIGHT` runs a worker are held at a time. On a terminal a bar counts them.
 
     Raises
     ------
     InputError
-        A limit that is not positive, fewer workers than one, or what :func:`experiments.closed_loop.simulate` refuses.
+        A limit that is not positive, or fewer workers than one.
 
     Notes
     -----
     The integration runs without Python's lock. What is left under it is a tenth of a run, so that threads serve up to
     some eight cores; a campaign (:mod:`experiments.campaign`) runs in processes, or on a cluster.
     """
+    references, limits = tuple(references), tuple(limits)
     if bad := [limit for limit in limits if not limit > 0]:
         raise InputError(f"a limit is {bad[0]:g}; expected positive numbers")
     count = os.cpu_count() or 1 if workers is None else workers
@@ -83,15 +84,15 @@ def simulate_many(
 
 def _streamed(
     cases: Iterator[Case], controllers: Mapping[str, Controller], time_s: np.ndarray, workers: int
-) -> Iterator[tuple[Case, Run | DivergenceError]]:
-    def run(case: Case) -> Run | DivergenceError:
+) -> Iterator[tuple[Case, Run | InputError]]:
+    def run(case: Case) -> Run | InputError:
         loop = plant_loop(controllers[case.anti_windup], case.plant, case.reference)
         try:
             return simulate(loop, (-case.limit, case.limit), time_s)
-        except DivergenceError as error:
+        except InputError as error:
             return error
 
-    ahead: deque[tuple[Case, Future[Run | DivergenceError]]] = deque()
+    ahead: deque[tuple[Case, Future[Run | InputError]]] = deque()
     with ThreadPoolExecutor(workers) as pool, tqdm(desc="runs", unit="", disable=None, leave=False) as bar:
         try:
             while True:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import chain
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import design
+import experiments
+import identification
 from design.contract import Design
 from experiments import delay_free, extended
 from experiments.closed_loop import DivergenceError, simulate
@@ -43,12 +48,15 @@ class Campaign:
         Not negative.
     limit
         Saturation limits +-limit.
+    code_sha256
+        Of the code that asks for it, see :func:`code_sha256`.
     """
 
     design: Design = field(compare=False)
     design_sha256: str
     seed: int
     limit: float
+    code_sha256: str
 
     @property
     def reference(self) -> Reference:
@@ -69,6 +77,16 @@ class Campaign:
     def horizon_s(self) -> float:
         """Length of a run in seconds."""
         return self.periods * self.span_s
+
+
+@lru_cache(maxsize=1)
+def code_sha256() -> str:
+    """The sha256 of this package's rooms up to this one, of their modules' names and texts."""
+    digest = hashlib.sha256()
+    for room in (identification, design, experiments):
+        for module in sorted(Path(str(room.__file__)).parent.glob("*.py")):
+            digest.update(f"{room.__name__}/{module.name}".encode() + module.read_bytes())
+    return digest.hexdigest()
 
 
 def usual_limit(design: Design) -> float:
@@ -127,12 +145,15 @@ def run_chunk(campaign: Campaign, first: int, last: int) -> Columns:
     Raises
     ------
     InputError
-        A plant cannot be drawn or a loop not be simulated; the sentence names the plant.
+        A plant cannot be drawn or a loop not be simulated, and the sentence names the plant; or the code that runs
+        is not that which asked for it.
 
     Notes
     -----
     The errors are those at 500 samples a period. The runs start from rest and follow the thesis's reference.
     """
+    if campaign.code_sha256 != code_sha256():
+        raise InputError("a worker has other code of this package than the command; expected the same, to the byte")
     prepared = _prepared(campaign)
     columns: Columns = {}
     for index in range(first, last):

@@ -32,7 +32,7 @@ def campaign_command(
 
     Interrupted, the same command goes on from what is done.
     """
-    from experiments.campaign import Campaign, usual_limit
+    from experiments.campaign import Campaign, code_sha256, usual_limit
     from experiments.campaign_file import CampaignFile
     from experiments.campaign_workers import run_here, run_on_cluster
 
@@ -43,7 +43,7 @@ def campaign_command(
     content = read_design(design)
     limit = usual_limit(content) if positive_limit(limit) is None else limit
     assert limit is not None
-    campaign = Campaign(content, hashlib.sha256(read_bytes(design)).hexdigest(), seed, limit)
+    campaign = Campaign(content, hashlib.sha256(read_bytes(design)).hexdigest(), seed, limit, code_sha256())
     file = CampaignFile(output, campaign, plants, design)
     missing = file.missing
     left = sum(last - first for first, last in missing)

@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import design
-import experiments
-import identification
 from experiments.campaign import CHUNK, Campaign, Columns
 from identification.files import InputError, read_text, write_whole
 
 MANIFEST = "manifest.json"
 PARTIAL = ".partial-"  # of a command that was killed while it wrote
+RUNS = 3  # a plant
 PARTS_A_GROUP = 80  # of the file's row groups: 6000 rows
 SYNTHETIC = "plants drawn at random inside W_a, not measured"
 PACKAGES = ("antiwindup-thesis", "numpy", "scipy", "numba", "pyarrow")
+TOLD = ("synthetic", "kind", "design_sha256", "seed", "plants", "limit", "horizon_s")  # in the file's metadata
 TEXTS, WHOLE, FLAGS = ("anti_windup",), ("plant", "events"), ("linear_stable", "diverged")
-
-
-def _code() -> str:
-    """The sha256 of this package's rooms up to this one, of their modules' names and texts."""
-    digest = hashlib.sha256()
-    for room in (identification, design, experiments):
-        for module in sorted(Path(str(room.__file__)).parent.glob("*.py")):
-            digest.update(f"{room.__name__}/{module.name}".encode() + module.read_bytes())
-    return digest.hexdigest()
 
 
 class CampaignFile:
@@ -70,10 +60,10 @@ class CampaignFile:
             "limit": campaign.limit,
             "horizon_s": campaign.horizon_s,
             "chunk": CHUNK,
-            "code_sha256": _code(),
+            "code_sha256": campaign.code_sha256,
             "versions": {name: version(name) for name in PACKAGES},
         }
-        self._metadata = {name: str(self._facts[name]) for name in list(self._facts)[:-3]} | {
+        self._metadata = {name: str(self._facts[name]) for name in TOLD} | {
             "design": source.name,
             "version": str(version(PACKAGES[0])),
         }
@@ -90,8 +80,8 @@ class CampaignFile:
 
     @property
     def missing(self) -> list[tuple[int, int]]:
-        """The chunks of which there is no part, see :func:`experiments.campaign.run_chunk`."""
-        return [chunk for chunk, part in self._parts.items() if not part.exists()]
+        """The chunks of which there is no part that is whole, see :func:`experiments.campaign.run_chunk`."""
+        return [chunk for chunk, part in self._parts.items() if not _is_whole(part, chunk)]
 
     def keep(self, chunk: tuple[int, int], columns: Columns) -> None:
         """Write the part of one chunk."""
@@ -107,14 +97,15 @@ class CampaignFile:
         write_whole({self.output: self._join})
         for path in [*self._parts.values(), self.folder / MANIFEST, *self.folder.glob(f"{PARTIAL}*")]:
             path.unlink(missing_ok=True)
-        self.folder.rmdir()
+        with suppress(OSError):  # what is not ours in it stays
+            self.folder.rmdir()
 
     def _join(self, partial: Path) -> None:
         import pyarrow
         from pyarrow import parquet
 
         parts = list(self._parts.values())
-        schema = parquet.read_schema(parts[0]).with_metadata(self._metadata)
+        schema = _read(parts[0]).schema.with_metadata(self._metadata)
         with parquet.ParquetWriter(partial, schema) as writer:
             for first in range(0, len(parts), PARTS_A_GROUP):
                 tables = [_read(part) for part in parts[first : first + PARTS_A_GROUP]]
@@ -159,6 +150,16 @@ def _table(columns: Columns) -> Any:
     kinds |= {name: pyarrow.int64() for name in WHOLE} | {name: pyarrow.bool_() for name in FLAGS}
     schema = pyarrow.schema([(name, kinds.get(name, pyarrow.float64())) for name in columns])
     return pyarrow.table(columns, schema=schema)
+
+
+def _is_whole(part: Path, chunk: tuple[int, int]) -> bool:
+    import pyarrow
+    from pyarrow import parquet
+
+    try:
+        return bool(parquet.read_metadata(part).num_rows == RUNS * (chunk[1] - chunk[0]))
+    except (pyarrow.ArrowException, OSError):
+        return False
 
 
 def _read(part: Path) -> Any:

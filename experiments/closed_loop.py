@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from experiments import taylor
-from experiments.compiled_loop import compile_loop
+from experiments.compiled_loop import CompiledLoop, compile_loop
 from experiments.saturated_loop import SaturatedLoop
 from identification.files import InputError
 
 MOST_STEPS = 2e7  # a few minutes
+MOST_ROOM = 1e8  # numbers, a gigabyte
 TAIL = 1e-11  # of a polynomial's terms, see integrate
 
 
@@ -30,7 +32,7 @@ class Run:
         Name -> samples (s,).
     events_s, modes
         Every time at which u crosses a limit, located to rounding, and the mode entered: 1 at the upper limit,
-        -1 at the lower one, 0 unsaturated.
+        -1 at the lower one, 0 unsaturated. A jump of u across both limits is two events at one time.
     """
 
     time_s: np.ndarray
@@ -83,8 +85,13 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
         raise InputError("the sample times are not increasing finite numbers from zero on that end after zero")
     compiled = compile_loop(loop)
     horizon = float(time_s[-1])
-    most_events, room = 4096, 64
+    most_events, room = 4096, _room(compiled)
     while True:
+        if room * compiled.increments.shape[2] > MOST_ROOM:
+            raise InputError(
+                f"the dead times reach from {compiled.delays.min():.3g} to {compiled.delays.max():.3g} s, too many "
+                "steps to remember; expected dead times that differ less, or zero"
+            )
         step = compiled.step
         if horizon / step > MOST_STEPS:
             raise InputError(
@@ -111,9 +118,12 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
             room,
         )
         if status == taylor.CROWDED:
-            most_events, room = 4 * most_events, 4 * room
+            room *= 2
+        elif status == taylor.EVENTFUL:
+            most_events *= 8
         elif status == taylor.COMPLETE and tail > TAIL:
             compiled = compile_loop(loop, step / 2)
+            room = max(room, _room(compiled))
         else:
             break
     if status == taylor.DIVERGED:
@@ -129,3 +139,9 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
         events_s=events,
         modes=modes,
     )
+
+
+def _room(compiled: CompiledLoop) -> int:
+    """Room for the steps that the longest dead time remembers, twice as many, and a power of two."""
+    longest = float(compiled.delays.max(initial=0.0))
+    return 1 << math.ceil(math.log2(64 + 2 * longest / compiled.step))

@@ -57,10 +57,12 @@ def compile_loop(loop: SaturatedLoop, most_step: float = np.inf) -> CompiledLoop
     saturated = compressed(np.vstack([np.hstack([A, loop.B[:, None], D]), *read]))
 
     fastest = max(np.abs(np.linalg.eigvals(matrix)).max() for matrix in (A, free_A))
-    step = min(FURTHEST / fastest if fastest > 0 else 1.0, most_step)
+    step = min(FURTHEST / fastest if fastest > 0 else np.inf, most_step)
     if k:
         shortest = float(delays.min())
-        step = shortest / np.ceil(shortest / step)
+        step = shortest / max(np.ceil(shortest / step), 1.0)
+    elif np.isinf(step):
+        step = 1.0  # of integrators alone, whose series end by themselves
     while True:
         tables = [tabulate(rows, n, k, step) for rows in (unsaturated, saturated)]
         if all(degree >= 0 for _, _, degree in tables):

@@ -37,12 +37,11 @@ def shift(c: Array, degree: int, delta: float, work: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def insert(queue: Array, queued: int, t: float) -> int:
-    """Insert a time into the sorted queue, unless it is there already, to rounding; its new length."""
+def insert(queue: Array, queued: int, t: float, near: float) -> int:
+    """Insert a time into the sorted queue, unless one is ``near`` it already; its new length."""
     k = queued
     while k > 0 and queue[k - 1] > t:
         k -= 1
-    near = 1e-13 * (1.0 + abs(t))
     if (k > 0 and t - queue[k - 1] <= near) or (k < queued and queue[k] - t <= near):
         return queued
     for q in range(queued, k, -1):

@@ -18,6 +18,7 @@ from experiments.scenarios import Reference, SampledReference
 from identification.files import InputError
 from identification.plant import PlantModel
 
+MOST_LEVELS = 2.0**53  # which are still whole numbers
 SPARE = 1e-12  # relative: the quotient of two decimals may come out a rounding below a whole number
 
 
@@ -63,6 +64,9 @@ class Drive:
             raise InputError(f"the slew is {self.slew:g} a second; expected a positive number, inf for no limit")
         if not 0 <= self.input_delay_s < math.inf:
             raise InputError(f"the input delay is {self.input_delay_s:g} s; expected a number that is not negative")
+        largest = max((abs(end) for end in self.limits if math.isfinite(end)), default=0.0)
+        if self.quantum > 0 and largest / self.quantum > MOST_LEVELS:
+            raise InputError(f"the quantum is {self.quantum:g}; expected 0, or no less than the limits over 2^53")
         lowest, highest = self.levels
         if lowest > highest:
             raise InputError(f"no multiple of the quantum {self.quantum:g} lies within {low:g} and {high:g}")
@@ -164,7 +168,7 @@ def simulate_sampled(
     _require_one_solution(forward, feedback, theta, drive.rate_hz)
     time_s = instants(drive.rate_hz, until_s)
     r = reference(time_s)
-    whole, rest = split(drive.input_delay_s + plant.delay_s, T)
+    whole, rest = split(min(drive.input_delay_s + plant.delay_s, until_s + 2 * T), T)  # beyond the run is beyond
     low, high = drive.limits
     y, u, command, start, reached = run(
         forward.A,
@@ -229,7 +233,7 @@ def _require_one_solution(forward: SampledBlock, feedback: SampledBlock, theta: 
 
 def _actuator(drive: Drive, command: np.ndarray, start: np.ndarray) -> np.ndarray:
     """The actuator's output at the sampling instants from the commands (s,) and where it stands as each is issued."""
-    whole, rest = split(drive.input_delay_s, 1 / drive.rate_hz)
+    whole, rest = split(min(drive.input_delay_s, (len(command) + 2) / drive.rate_hz), 1 / drive.rate_hz)
     late, since = (whole + 1, (1 - rest) / drive.rate_hz) if rest else (whole, 0.0)
     reach = drive.slew * since if math.isfinite(drive.slew) else math.inf
     moved = start + np.clip(command - start, -reach, reach)

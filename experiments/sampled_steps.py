@@ -103,6 +103,8 @@ def run(
     around, direct = at_once * d_T, at_once * d_w[1]
     through = d_K * direct / (1 - around)  # u_tilde -> y_d -> v
     place = min(max(0.0, low), high)
+    if quantum > 0:
+        place = quantum * min(max(np.rint(place / quantum), lowest), highest)
     for k in range(s):
         p_T[k], p_w[k] = _dot(c_T, x_T), _row(C_w, 1, x_w)
         fed, y_d = 0.0, 0.0

@@ -25,7 +25,7 @@ NOTHING = 1e-30  # what is smaller than this share of the largest value of its s
 BEYOND = 0.5  # of a step: how far beyond its end, where no kink is, the polynomial of a cut step is read
 DIVERGENT = 1e100  # a loop whose state passes this diverges
 
-COMPLETE, DIVERGED, ENDLESS, CROWDED = 0, 1, 2, 3
+COMPLETE, DIVERGED, ENDLESS, CROWDED, EVENTFUL = 0, 1, 2, 3, 4
 
 
 @njit(cache=True, nogil=True)
@@ -63,7 +63,7 @@ def integrate(
     -------
     values (1 + o, s), events (e,), modes (e,), status, end, steps, tail
         u and what is watched at the samples; event times with the mode entered (-1, 0, 1); COMPLETE, DIVERGED,
-        ENDLESS (too many steps) or CROWDED (too many events, or too little room); the time reached; the number of
+        ENDLESS (too many steps), CROWDED (too little room) or EVENTFUL; the time reached; the number of
         steps; the largest last term of a signal's polynomial, as a share of the largest that the signal was.
     """
     n, k = len(x0), len(delays)
@@ -131,7 +131,7 @@ def integrate(
             for i in range(degree + 1):
                 W[i] = history[piece, j, i]
             moved = start - starts[piece] + (late - lates[piece])
-            if abs(moved) > 4e-16 * (1.0 + t):  # else the same time, to rounding
+            if abs(moved) > 4e-16 * (step + t):  # else the same time, to rounding
                 shift(W, degree, moved / step, work)
             power = radius**degree
             while degree > 0 and abs(W[degree]) * power <= NEGLIGIBLE * size[1 + j]:
@@ -163,7 +163,7 @@ def integrate(
             for s in range(1 + k):
                 last[s] = max(last[s], abs(P[s, most]) * power)
 
-        whole = abs(t_next - t - step) <= 1e-15 * (1.0 + t)
+        whole = abs(t_next - t - step) <= 1e-15 * (step + t)
         if reset < len(reset_times) and t_next == reset_times[reset]:
             whole = False  # it ends there to the last digit
         reach = 1.0 if whole else max((t_next - t - late) / step, 0.0)
@@ -192,7 +192,7 @@ def integrate(
                         for i in range(before + 1):
                             W[i] = history[left, j, i]
                     if gap(W, before, moved, history[piece, j], degree, work) > NEGLIGIBLE * size[1 + j]:
-                        queued = insert(queue, queued, t + delays[j])
+                        queued = insert(queue, queued, t + delays[j], 1e-13 * (step + t))
                 kink = False
             pieces += 1
 
@@ -247,7 +247,7 @@ def integrate(
         on_limit = crossed
         if exit_at >= 0:
             if event_count == most_events:
-                status = CROWDED
+                status = EVENTFUL
                 break
             mode, kink = entered, True
             events[event_count], modes[event_count] = t, mode
@@ -256,7 +256,7 @@ def integrate(
             x[: resets.shape[1]] = resets[reset]
             reset, kink = reset + 1, True
         passed = 0
-        while passed < queued and queue[passed] <= t + 1e-13 * (1.0 + t):
+        while passed < queued and queue[passed] <= t + 1e-13 * (step + t):
             passed, kink = passed + 1, True
         if passed > 0:
             queued -= passed

@@ -12,7 +12,7 @@ from identification.files import InputError
 from identification.plant import AdditiveBound, Mode, PlantModel
 
 LARGEST = np.log(2.0)  # of a parameter's change in logarithms, however loose the bound
-SHORTEST = 0.05  # of its unit, below which a dead time of 0 stays 0
+SHORTEST = 0.05  # of its unit, below which a dead time of 0 stays 0; of itself, to which another one shrinks at most
 SMALLEST = 1e-9  # of the largest change, below which none is within the bound
 FINER = 3  # points of the check for one of the search
 AROUND = np.sort(np.concatenate([[0.0], *(sign * np.geomspace(7e-3, 7e2, 61) for sign in (-1, 1))]))  # half widths
@@ -63,7 +63,7 @@ class PlantsWithin:
     that alone, upwards, brings P to the boundary of W_a (at most a factor of 2; of the dead time at most itself or
     1/corner of W_a, whichever is larger), and the direction is a vector of independent standard normal numbers in
     these units. A dead time of 0 may only grow; it stays 0 where it would grow by less than a twentieth of its unit,
-    since a run takes at least one step a dead time.
+    and another one shrinks to no less than a twentieth of itself, since a run takes at least one step a dead time.
 
     Along the direction the plant lies at a share, uniform in (0, 1], of the way to the boundary. To first order that
     share is its distance. It is not the distance itself that is drawn, because where W_a and P fall alike a plant with
@@ -130,7 +130,7 @@ class PlantsWithin:
         with np.errstate(divide="ignore"):
             most = np.min(self._most / np.abs(direction))
         if direction[-1] < 0:
-            most = min(most, self.plant.delay_s / -direction[-1])
+            most = min(most, (1 - SHORTEST) * self.plant.delay_s / -direction[-1])
         t = share * self._reach(float(np.log(corner)), direction, most)
         if self.plant.delay_s == 0 and t * direction[-1] < SHORTEST * self._units[-1]:
             direction = np.append(direction[:-1], 0.0)

@@ -113,6 +113,8 @@ def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterab
             os.close(handle)
             written[goal] = Path(name)
             write(written[goal])
+            with written[goal].open("rb+") as whole:  # a power cut must not leave a name without its contents
+                os.fsync(whole.fileno())
             written[goal].chmod(0o666 & ~_umask())
         for target, temporary in written.items():
             temporary.replace(target)

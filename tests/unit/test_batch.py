@@ -40,7 +40,7 @@ def test_a_batch_is_its_runs_one_by_one(extended_design: Design, workers: int) -
         assert case.reference is reference
         assert (case.anti_windup, case.limit) == (kind, limit)
         single = simulate(design_loop(extended_design, reference, kinds[kind], plant), (-limit, limit), TIMES)
-        assert not isinstance(run, DivergenceError)
+        assert not isinstance(run, InputError)
         np.testing.assert_array_equal(run.control, single.control)
         np.testing.assert_array_equal(run.events_s, single.events_s)
         for name, values in single.outputs.items():
@@ -64,15 +64,18 @@ def test_no_more_is_taken_than_is_in_flight(extended_design: Design) -> None:
     runs.close()  # type: ignore[attr-defined]
 
 
-def test_a_loop_that_diverges_is_a_result(extended_design: Design) -> None:
+def test_a_loop_that_diverges_or_is_refused_is_a_result(extended_design: Design) -> None:
     # ten times the dead time is beyond the loop's margin; 40 is no limit for long
     slow = replace(extended_design.plant, delay_s=30 * extended_design.plant.delay_s)
-    plants = [extended_design.plant, slow, extended_design.plant]
+    never = replace(extended_design.plant, delay_s=1e-9)  # 1e12 steps
+    plants = [extended_design.plant, slow, never, extended_design.plant]
     runs = simulate_many(extended_design, plants, REFERENCES[:1], {"none": None}, [np.inf], np.array([0.0, 400.0]))
-    first, second, third = (run for _, run in runs)
+    first, second, third, fourth = (run for _, run in runs)
     assert isinstance(second, DivergenceError)
-    assert not isinstance(first, DivergenceError)
-    assert not isinstance(third, DivergenceError)
+    assert isinstance(third, InputError)
+    assert "steps" in str(third)
+    assert not isinstance(first, InputError)
+    assert not isinstance(fourth, InputError)
 
 
 @pytest.mark.parametrize(("limits", "workers", "message"), [([12.0, 0.0], 1, "limit is 0"), ([12.0], 0, "0 workers")])

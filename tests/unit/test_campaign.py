@@ -23,7 +23,7 @@ from design.quasi_polynomial import roots_right_of
 from design.robustness import delay_loop
 from experiments import campaign_file
 from experiments.__main__ import main
-from experiments.campaign import Campaign, run_chunk
+from experiments.campaign import Campaign, code_sha256, run_chunk
 from experiments.closed_loop import simulate
 from experiments.loops import design_loop
 from experiments.perturbed_stability import PerturbedLoop
@@ -93,7 +93,7 @@ def test_another_integrator_is_refused(extended_design: Design) -> None:
 
 @pytest.fixture(scope="module")
 def campaign(extended_design: Design) -> Campaign:
-    return Campaign(extended_design, "of a test", 1, LIMIT)
+    return Campaign(extended_design, "of a test", 1, LIMIT, code_sha256())
 
 
 def test_rows_are_those_of_single_runs(campaign: Campaign, extended_design: Design) -> None:
@@ -129,6 +129,11 @@ def test_a_plant_is_the_same_in_every_chunk(campaign: Campaign) -> None:
     assert together == {name: apart[1][name] + apart[0][name] for name in together}
 
 
+def test_other_code_than_the_commands_is_refused(campaign: Campaign) -> None:
+    with pytest.raises(InputError, match="other code"):
+        run_chunk(replace(campaign, code_sha256="0"), 0, 1)
+
+
 def test_a_run_that_diverges_is_a_result(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     from experiments import campaign as module
 
@@ -144,7 +149,7 @@ def test_a_run_that_diverges_is_a_result(campaign: Campaign, monkeypatch: pytest
 
 def test_a_chapter_2_design_runs_too(delay_free_design: Design) -> None:
     """No dead time in its loop: that of the true plant may only grow."""
-    campaign = Campaign(delay_free_design, "another", 2, 10.0)
+    campaign = Campaign(delay_free_design, "another", 2, 10.0, code_sha256())
     columns = run_chunk(campaign, 1, 2)
     assert columns["delay_s"][0] >= 0
     assert columns["zero_omega_1"][0] != delay_free_design.plant.zero_modes[0].omega

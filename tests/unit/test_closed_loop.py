@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from oracle import reference_run
@@ -11,7 +13,7 @@ from experiments import compiled_loop
 from experiments.closed_loop import DivergenceError, simulate
 from experiments.crossings import first_exit
 from experiments.loops import design_loop, pid_loop
-from experiments.saturated_loop import SaturatedLoop
+from experiments.saturated_loop import Resets, SaturatedLoop
 from experiments.scenarios import PidBenchmark, sinusoid, thesis_reference
 from identification.files import InputError
 
@@ -168,3 +170,42 @@ def test_divergence_is_said() -> None:
 def test_bad_arguments_are_refused(limits: tuple[float, float], times: list[float], message: str) -> None:
     with pytest.raises(InputError, match=message):
         simulate(scalar_loop(0.0, 1.0, 0.1, 1.0), limits, np.array(times))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"A": np.array([[np.nan]])}, "A of the loop is not finite"),
+        ({"x0": np.array([np.inf])}, "x0 of the loop is not finite"),
+        ({"delays": np.array([-0.1])}, "dead times"),
+        ({"delays": np.array([np.inf])}, "dead times"),
+        ({"outputs": {"x": (np.array([np.nan]), np.zeros(1))}}, "output x"),
+    ],
+)
+def test_loops_that_cannot_be_are_refused(changes: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        dataclasses.replace(scalar_loop(0.0, 1.0, 0.1, 1.0), **changes)
+
+
+@pytest.mark.parametrize(("times", "message"), [([-1.0], "increase"), ([1.0, 1.0], "increase"), ([np.nan], "finite")])
+def test_resets_that_cannot_be_are_refused(times: list[float], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Resets(np.array(times), np.zeros((len(times), 1)))
+
+
+def test_dead_times_too_far_apart_are_refused() -> None:
+    # one of 1e-6 s makes the steps, one of 1e3 s would remember 1e9 of them
+    pair = {"D": np.zeros((1, 2)), "E": np.array([-0.1, -0.1]), "Z": np.ones((2, 1)), "delays": np.array([1e-6, 1e3])}
+    loop = dataclasses.replace(scalar_loop(0.0, 1.0, 0.1, 1.0), outputs={}, **pair)
+    with pytest.raises(InputError, match="too many steps to remember"):
+        simulate(loop, FREE, np.array([0.0, 1.0]))
+
+
+@pytest.mark.parametrize("unit", [2.0**-33, 1.0, 2.0**20])
+def test_the_unit_of_time_does_not_matter(unit: float) -> None:
+    loop = scalar_loop(0.0, 1.5, 0.9, 1.0)
+    scaled = dataclasses.replace(loop, A=loop.A / unit, B=loop.B / unit, delays=loop.delays * unit)
+    t = np.linspace(0.0, 7.0, 71)
+    run, other = (simulate(one, (-0.5, 0.3), times) for one, times in ((loop, t), (scaled, t * unit)))
+    np.testing.assert_allclose(other.outputs["x"], run.outputs["x"], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(other.events_s, run.events_s * unit, rtol=1e-12)

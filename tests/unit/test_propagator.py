@@ -105,7 +105,7 @@ def test_the_gap_is_the_difference_half_a_step_around() -> None:
 def test_the_queue_is_sorted_and_holds_a_time_once() -> None:
     queue, queued = np.zeros(8), 0
     for t in (3.0, 1.0, 2.0, 2.0 + 1e-14, 1.0 - 1e-14, 0.5):
-        queued = insert(queue, queued, t)
+        queued = insert(queue, queued, t, 1e-13)
     np.testing.assert_array_equal(queue[:queued], [0.5, 1.0, 2.0, 3.0])
 
 
