@@ -96,12 +96,18 @@ def _facts(path: Path) -> dict[str, Any]:
     missing = [name for name in COLUMNS if name not in schema.names]
     if missing:
         raise InputError(f"{path}: no column {missing[0]}; expected the file of a campaign, with {', '.join(COLUMNS)}")
+    twice = [name for name in COLUMNS if schema.names.count(name) > 1]
+    if twice:
+        raise InputError(f"{path}: holds the column {twice[0]} {schema.names.count(twice[0])} times; expected it once")
     said, facts = schema.metadata or {}, {}
     for name, kind in FACTS.items():
         try:
             facts[name] = kind(said[name.encode()])
         except (KeyError, ValueError):
             raise InputError(f"{path}: its metadata give no {name}; expected the file of a campaign") from None
+    for name, value in facts.items():
+        if np.isnan(value):
+            raise InputError(f"{path}: its {name} is nan; expected a number")
     if facts["plants"] < 1:
         raise InputError(f"{path}: no plants; expected at least one")
     return facts

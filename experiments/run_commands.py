@@ -106,6 +106,8 @@ def simulate_command(
     write_tables({output: table}, _inputs(design, plant, reference["reference"]))
     saturated = last_saturation(run)
     said = "saturated to the end" if np.isnan(saturated) else f"last saturated at {saturated:.6g} s"
+    if not len(run.events_s) and not np.isnan(saturated):
+        said = "never saturated"
     click.echo(f"{len(table)} rows -> {output}; {len(run.events_s)} crossings of the limits, {said}")
 
 

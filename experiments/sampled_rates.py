@@ -17,6 +17,7 @@ from experiments.sampled import Drive, SampledRun, instants, simulate_sampled
 from experiments.sampled_controller import METHODS
 from experiments.scenarios import Reference, thesis_reference
 from experiments.tracking import SETTLED, compensators, loops, run_all, span
+from identification.files import InputError
 from identification.thesis import printed
 
 # Our choices, in units of the design: the thesis has no computer and no drive.
@@ -62,6 +63,8 @@ def sampled_rates_tables(design: Design, limit: float | None = None) -> dict[str
         target = printed()["extended"]["desaturation_s"]
         required = reference.required(design.loop_plant)
         limit = limit_for_last_saturation(continuous["none"], target, required, max(horizon, PERIODS * target))
+    if not math.isfinite(limit):
+        raise InputError(f"the limit is {limit:g}; expected a finite one, whose range a converter divides")
     root = fastest_root(*design.controller_parts())
     rates = {n: n * root / (2 * math.pi) for n in SAMPLES}
     facts = {

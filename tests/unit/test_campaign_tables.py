@@ -172,10 +172,18 @@ def test_what_no_campaign_writes_is_refused(sentence: str, tmp_path: Path) -> No
         ({}, "its metadata give no plants"),
         (FACTS | {"limit": "high"}, "its metadata give no limit"),
         (FACTS | {"plants": "0"}, "no plants; expected at least one"),
+        (FACTS | {"limit": "nan"}, "its limit is nan"),
     ],
 )
 def test_metadata_that_are_missing_are_refused(facts: dict[str, str], sentence: str, tmp_path: Path) -> None:
     assert sentence in refusal(written(tmp_path / "bad.parquet", plants(), facts), tmp_path)
+
+
+def test_a_column_that_is_there_twice_is_refused(campaign: Path, tmp_path: Path) -> None:
+    table = parquet.read_table(campaign)
+    path = tmp_path / "twice.parquet"
+    parquet.write_table(table.append_column("plant", table["plant"]), path)
+    assert "holds the column plant 2 times" in refusal(path, tmp_path)
 
 
 def test_what_is_no_parquet_file_is_refused(campaign: Path, tmp_path: Path) -> None:

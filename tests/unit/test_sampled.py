@@ -22,6 +22,7 @@ from experiments.closed_loop import DivergenceError, simulate
 from experiments.loops import design_loop
 from experiments.sampled import Drive, SampledRun, simulate_sampled
 from experiments.sampled_controller import METHODS, sample_block
+from experiments.sampled_rates import sampled_rates_tables
 from experiments.scenarios import Reference, SampledReference, sinusoid, thesis_reference
 from identification.discretised import pulse_response
 from identification.files import InputError
@@ -412,5 +413,28 @@ def test_runs_that_cannot_be_are_refused(other_design: Design) -> None:
 def test_a_dead_time_longer_than_the_run(other_design: Design) -> None:
     late = dataclasses.replace(TRUE, delay_s=50.0)
     run = simulate_sampled(other_design, REFERENCE, None, Drive(100.0, "tustin", (-1.0, 1.0), 0.0, 5.0, 9.0), 4.0, late)
+    assert not run.output.any()
+    assert not run.saturated_control.any()
+
+
+def test_a_drive_without_a_range_has_no_converter(extended_design: Design) -> None:
+    with pytest.raises(InputError, match="limit is inf; expected a finite one"):
+        sampled_rates_tables(extended_design, math.inf)
+
+
+def test_levels_too_many_to_count_are_refused() -> None:
+    with pytest.raises(InputError, match=r"quantum is 1e-300; expected 0, or no less"):
+        Drive(1000.0, "tustin", (-12.0, 12.0), quantum=1e-300)
+
+
+def test_an_actuator_begins_at_a_level(extended_design: Design) -> None:
+    drive = Drive(1000.0, "tustin", (1.0, 12.0), quantum=0.3, input_delay_s=0.0105)
+    run = simulate_sampled(extended_design, sinusoid(50.0, 1.5, 0.0, 0.0), None, drive, 0.02)
+    assert run.saturated_control[0] == pytest.approx(1.2)
+
+
+def test_a_dead_time_beyond_all_bounds(extended_design: Design) -> None:
+    drive = Drive(1000.0, "exact", (-12.0, 12.0), input_delay_s=1e300)
+    run = simulate_sampled(extended_design, sinusoid(50.0, 1.5, 0.0, 0.0), None, drive, 0.1)
     assert not run.output.any()
     assert not run.saturated_control.any()
