@@ -86,8 +86,8 @@ def _streamed(
     cases: Iterator[Case], controllers: Mapping[str, Controller], time_s: np.ndarray, workers: int
 ) -> Iterator[tuple[Case, Run | InputError]]:
     def run(case: Case) -> Run | InputError:
-        loop = plant_loop(controllers[case.anti_windup], case.plant, case.reference)
         try:
+            loop = plant_loop(controllers[case.anti_windup], case.plant, case.reference)
             return simulate(loop, (-case.limit, case.limit), time_s)
         except InputError as error:
             return error

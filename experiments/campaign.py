@@ -17,8 +17,7 @@ import identification
 from design.contract import Design
 from experiments import delay_free, extended
 from experiments.closed_loop import DivergenceError, simulate
-from experiments.extended import limit_for_last_saturation
-from experiments.loops import Controller, design_loop, plant_loop, realized_controller
+from experiments.loops import Controller, plant_loop, realized_controller
 from experiments.metrics import last_saturation, settling_time
 from experiments.perturbed_stability import PerturbedLoop
 from experiments.scenarios import Reference, thesis_reference
@@ -95,15 +94,11 @@ def usual_limit(design: Design) -> float:
     Raises
     ------
     InputError
-        There is none, see :func:`experiments.extended.limit_for_last_saturation`.
+        There is none, see :func:`experiments.extended.usual_limit`.
     """
     if design.kind == "delay-free":
         return float(printed()["delay_free"]["limit"])
-    reference = thesis_reference("extended", design.reference_omegas)
-    target = float(printed()["extended"]["desaturation_s"])
-    horizon = max(extended.PERIODS * span(design, reference), extended.PERIODS * target)
-    required = reference.required(design.loop_plant)
-    return limit_for_last_saturation(design_loop(design, reference, None), target, required, horizon)
+    return extended.usual_limit(design)
 
 
 def run_chunk(campaign: Campaign, first: int, last: int) -> Columns:

@@ -7,6 +7,7 @@ import pandas as pd
 
 from design.contract import Design
 from experiments.closed_loop import simulate
+from experiments.loops import design_loop
 from experiments.metrics import last_saturation
 from experiments.pade import with_pade
 from experiments.saturated_loop import SaturatedLoop
@@ -41,22 +42,36 @@ def extended_tables(design: Design, limit: float | None = None) -> dict[str, pd.
     -----
     Chapter 4 prints no limits. It says of the loop without anti-windup that "until around 4 seconds, the
     system operates in the nonlinear region"; the limit is the one that comes nearest to this, see
-    :func:`limit_for_last_saturation`.
+    :func:`usual_limit`.
     """
     reference = thesis_reference("extended", design.reference_omegas)
     required = reference.required(design.loop_plant)
     horizon = PERIODS * span(design, reference)
-    target = printed()["extended"]["desaturation_s"]
     exact = loops(design, reference)
     limit_is_given = limit is not None
     if limit is None:
-        limit = limit_for_last_saturation(exact["none"], target, required, max(horizon, PERIODS * target))
+        limit = usual_limit(design)
     every = exact | {f"{name}_pade": with_pade(exact[name], PADE_ORDER) for name in ("none", "thesis")}
     runs = run_all(every, limit, np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1))
     return {
         "extended": tracking_table(runs, reference),
         "extended_summary": tracking_summary(runs, limit, limit_is_given, reference, required, horizon / PERIODS),
     }
+
+
+def usual_limit(design: Design) -> float:
+    """The limit +-L that an extended design is run with unless another is given.
+
+    Raises
+    ------
+    InputError
+        There is none, see :func:`limit_for_last_saturation`.
+    """
+    reference = thesis_reference("extended", design.reference_omegas)
+    target = float(printed()["extended"]["desaturation_s"])
+    horizon = PERIODS * max(span(design, reference), target)
+    loop = design_loop(design, reference, None)
+    return limit_for_last_saturation(loop, target, reference.required(design.loop_plant), horizon)
 
 
 def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: float, horizon_s: float) -> float:

@@ -11,14 +11,13 @@ from design.anti_windup import AntiWindup
 from design.block import fastest_root
 from design.contract import Design
 from experiments.closed_loop import DivergenceError
-from experiments.extended import PERIODS, limit_for_last_saturation
+from experiments.extended import PERIODS, usual_limit
 from experiments.metrics import over_last, settling_time
 from experiments.sampled import Drive, SampledRun, instants, simulate_sampled
 from experiments.sampled_controller import METHODS
 from experiments.scenarios import Reference, thesis_reference
 from experiments.tracking import SETTLED, compensators, loops, run_all, span
 from identification.files import InputError
-from identification.thesis import printed
 
 # Our choices, in units of the design: the thesis has no computer and no drive.
 SAMPLES = (2, 4, 8, 16, 32, 64)  # in a period of the fastest root of the controller
@@ -60,9 +59,7 @@ def sampled_rates_tables(design: Design, limit: float | None = None) -> dict[str
     horizon = (PERIODS + MORE_PERIODS) * period
     continuous = loops(design, reference)
     if limit is None:
-        target = printed()["extended"]["desaturation_s"]
-        required = reference.required(design.loop_plant)
-        limit = limit_for_last_saturation(continuous["none"], target, required, max(horizon, PERIODS * target))
+        limit = usual_limit(design)
     if not math.isfinite(limit):
         raise InputError(f"the limit is {limit:g}; expected a finite one, whose range a converter divides")
     root = fastest_root(*design.controller_parts())
