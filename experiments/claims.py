@@ -1,4 +1,4 @@
-"""The ledger of the numbers that the thesis prints: recompute each, and say whether it agrees."""
+"""The ledger of what the thesis prints: recompute each claim, and say whether it agrees."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from identification.files import InputError, read_text
 from identification.thesis import DATA
 
 LEDGER = DATA / "thesis" / "claims.csv"
-COLUMNS = ("id", "where", "quote", "printed", "unit", "kind", "compute", "status", "reason")
+COLUMNS = ("id", "where", "quote", "printed", "unit", "kind", "compute", "status", "reason", "evidence")
 SLACK = 1e-9  # relative; 175^2 = 30625 lies half-way between the printed 3.062e4 and 3.063e4
 
 Compute = Callable[[Inputs], Mapping[str, float]]
@@ -43,21 +43,22 @@ def recompute(ledger: pd.DataFrame) -> pd.DataFrame:
     ----------
     ledger
         As :func:`read_ledger` returns it. ``compute`` names a function MODULE:FUNCTION that takes the rounded
-        inputs and returns id -> value; it is empty for an input that nothing else in print contradicts.
+        inputs and returns id -> value. An id ``NAME#2`` is NAME printed a second time. A statement is printed as
+        ``true``, which is 1; its function returns 1 or 0.
 
     Returns
     -------
     DataFrame
         The ledger with ``computed``, ``half_unit`` (of the last printed digit), ``tolerance`` and ``verdict``:
-        ``input`` without ``compute``; ``not_reproducible`` when the function returns NaN, because the thesis
-        does not print what the number depends on; ``agrees`` when computed - printed is within the tolerance;
-        ``differs`` otherwise.
+        ``agrees`` when computed - printed is within the tolerance, ``input`` if the kind is input: then the number
+        was transcribed, not reproduced; ``differs`` otherwise; ``not_reproducible`` when the function returns NaN,
+        because the thesis does not print what the number depends on; ``unchecked`` without ``compute``.
 
     Notes
     -----
     tolerance = half_unit + SLACK |printed|, and, only where computed - printed exceeds that, the propagated rounding
     of the inputs. This is linear: each rounded input that the function reads is moved by plus and minus half a
-    unit of its own last digit, and the larger changes are summed.
+    unit of its own last digit, and the larger changes are summed. A statement, which has no digits, gets no tolerance.
 
     Raises
     ------
@@ -65,42 +66,42 @@ def recompute(ledger: pd.DataFrame) -> pd.DataFrame:
         A function does not exist or does not give a row's id.
     """
     inputs = rounded_inputs(ledger)
-    rows = ledger.assign(computed=np.nan, half_unit=0.0, tolerance=np.nan, verdict="input")
+    rows = ledger.assign(computed=np.nan, half_unit=0.0, tolerance=np.nan, verdict="unchecked")
     for compute, claims in ledger.groupby("compute", sort=False):
         numbers = {name: read_number(text) for name, text in claims[["id", "printed"]].itertuples(index=False)}
         rows.loc[claims.index, "half_unit"] = [number.half_unit for number in numbers.values()]
         if compute:
-            computed, tolerance = _compare(str(compute), numbers, inputs)
-            rows.loc[claims.index, "computed"] = computed
-            rows.loc[claims.index, "tolerance"] = tolerance
-            error = np.abs(computed - np.array([number.value for number in numbers.values()]))
-            verdict = np.where(error <= tolerance, "agrees", "differs")
-            rows.loc[claims.index, "verdict"] = np.where(np.isnan(computed), "not_reproducible", verdict)
+            rows.loc[claims.index, ["computed", "tolerance"]] = _compare(str(compute), numbers, inputs)
+    compared = rows["compute"] != ""
+    error = (rows["computed"] - [read_number(text).value for text in rows["printed"]]).abs()
+    within = np.where(rows["kind"] == "input", "input", "agrees")
+    verdict = np.where(error <= rows["tolerance"], within, "differs")
+    rows.loc[compared, "verdict"] = np.where(rows["computed"].isna(), "not_reproducible", verdict)[compared]
     return rows
 
 
-def _compare(
-    name: str, numbers: Mapping[str, PrintedNumber], inputs: Mapping[str, PrintedNumber]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Computed values and tolerances, in the order of the printed numbers."""
+def _compare(name: str, numbers: Mapping[str, PrintedNumber], inputs: Mapping[str, PrintedNumber]) -> np.ndarray:
+    """Computed values and tolerances of the printed numbers, shape (numbers, 2)."""
     compute = _function(name)
     recorder = _Recorder({key: number.value for key, number in inputs.items()})
     values = compute(recorder)
-    for row in numbers:
-        if row not in values:
-            raise InputError(f"{name} gives {', '.join(values)}; expected '{row}' among them")
+    keys = [row.partition("#")[0] for row in numbers]
+    for key in keys:
+        if key not in values:
+            raise InputError(f"{name} gives {', '.join(values)}; expected '{key}' among them")
     printed = np.array([number.value for number in numbers.values()])
-    computed = np.array([values[row] for row in numbers])
+    computed = np.array([values[key] for key in keys], dtype=float)
     tolerance = np.array([number.half_unit for number in numbers.values()]) + SLACK * np.abs(printed)
-    outside = np.abs(computed - printed) > tolerance
+    digits = np.array([number.half_unit > 0 for number in numbers.values()])
+    outside = (np.abs(computed - printed) > tolerance) & digits
     if outside.any():
-        spread = np.zeros(len(numbers))
-        for key in sorted(recorder.read):
-            number = inputs[key]
-            moved = [compute(dict(recorder) | {key: number.value + step * number.half_unit}) for step in (1, -1)]
-            spread += np.max([[abs(other[row] - values[row]) for row in numbers] for other in moved], axis=0)
+        spread = np.zeros(len(keys))
+        for moved_key in sorted(recorder.read):
+            number = inputs[moved_key]
+            moved = [compute(dict(recorder) | {moved_key: number.value + s * number.half_unit}) for s in (1, -1)]
+            spread += np.max([[abs(other[key] - values[key]) for key in keys] for other in moved], axis=0)
         tolerance[outside] += spread[outside]
-    return computed, tolerance
+    return np.column_stack([computed, tolerance])
 
 
 class _Recorder(dict[str, float]):

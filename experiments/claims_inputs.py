@@ -11,9 +11,12 @@ import pandas as pd
 from experiments.printed_number import PrintedNumber, read_number
 from identification.model import plant_from_dict
 from identification.plant import PlantModel
-from identification.thesis import DATA
+from identification.thesis import DATA, printed
 
 Inputs = Mapping[str, float]
+
+_REFERENCE = ("amplitude", "offset", "period_s", "phase_rad")
+_SIDES = {"n": "zero_modes", "d": "pole_modes"}
 
 
 def rounded_inputs(ledger: pd.DataFrame) -> dict[str, PrintedNumber]:
@@ -42,6 +45,30 @@ def rounded_inputs(ledger: pd.DataFrame) -> dict[str, PrintedNumber]:
     implied = _leaves("implied", content["plants"]["implied"])
     return {f"printed.{name}": read_number(text) for name, text in rows} | {
         key: read_number(digits) for key, digits in implied
+    }
+
+
+def transcribed(inputs: Inputs) -> dict[str, float]:
+    """The printed inputs as data/thesis/thesis.toml holds them for the rest of this project, in the ledger's units."""
+    values = printed()
+    plant, bound, pid = values["plants"]["table"], values["additive_bound"], values["pid"]
+    chapter_2, chapter_4 = values["delay_free"], values["extended"]
+    modes = {f"{side}{k}": mode for side in "nd" for k, mode in enumerate(plant[_SIDES[side]], start=1)}
+    return {
+        **{f"pid.{name}": pid[name] for name in ("time_constant_s", "delay_s", "limit")},
+        "pid.plant_gain": pid["gain"],
+        **{f"excitation.{name}": values["excitation"][name] for name in ("amplitude", "start_hz", "stop_hz")},
+        "table_2_1.K": plant["gain"],
+        "table_2_1.h": 1e3 * plant["delay_s"],
+        **{f"table_2_1.{key}_{name}": mode[key] for name, mode in modes.items() for key in ("omega", "zeta")},
+        **{f"W_a_2_22.{name}": bound[name] for name in ("gain", "corner", "zeta", "omega")},
+        **{f"delay_free.reference.{name}": chapter_2["reference"][name] for name in _REFERENCE},
+        "delay_free.reference.frequency_hz": 1 / chapter_2["reference"]["period_s"],
+        "delay_free.limit": chapter_2["limit"],
+        "delay_free.epsilon": chapter_2["epsilon"],
+        **{f"extended.reference.{name}": chapter_4["reference"][name] for name in ("amplitude", "omega", "phase_rad")},
+        "extended.desaturation_s": chapter_4["desaturation_s"],
+        **{f"table_4_1.{name}": chapter_4[name] for name in "aef"},
     }
 
 

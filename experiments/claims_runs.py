@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from design.extended import design_extended
 from experiments.claims_inputs import Inputs, plant_of
+from experiments.claims_statements import NOTHING, chapter_2, chapter_4
+from experiments.closed_loop import simulate
+from experiments.delay_free import delay_free_tables
 from experiments.extended import extended_tables
-from experiments.metrics import over_last
+from experiments.loops import design_loop
+from experiments.metrics import over_last, settling_time
 from experiments.pid import STEP, pid_tables
-from identification.model import read_model
+from experiments.scenarios import thesis_reference
+from experiments.tracking import SETTLED
 from identification.plant import PlantModel
 from identification.thesis import printed
 
@@ -22,6 +28,9 @@ def pid(inputs: Inputs) -> dict[str, float]:
 
     Without anti-windup Fig. 2.2 has a step response with an overshoot; of the printed gains and the swapped ones
     those are taken that end nearer to the step. The overshoot, in percent, is the one with back-calculation.
+
+    Statements: without anti-windup the output overshoots, and the control settles outside the actuator's range, with
+    either gains; with it u and sat(u) coincide, and the output settles sooner, with the gains that are taken.
     """
     tables = pid_tables()
     runs, summary = tables["pid"], tables["pid_summary"].iloc[0]
@@ -31,11 +40,26 @@ def pid(inputs: Inputs) -> dict[str, float]:
         name: over_last(time_s, runs[f"output_{name}_none"].to_numpy() - STEP, 20.0)[1]
         for name in ("printed", "swapped")
     }
-    proportional, integral = gains if ripple["printed"] < ripple["swapped"] else gains[::-1]
+    taken = min(ripple, key=lambda name: ripple[name])
+    proportional, integral = gains if taken == "printed" else gains[::-1]
+    limit = printed()["pid"]["limit"]
+    wound_up = []
+    for name in ripple:
+        middle, half = over_last(time_s, runs[f"control_{name}_none"].to_numpy(), 20.0)
+        wound_up.append(half < SETTLED * limit and abs(middle) > (1 + SETTLED) * limit)
+    without, with_it = (
+        settling_time(time_s, runs[f"output_{taken}_{kind}"].to_numpy() - STEP, 2 * SETTLED * STEP)
+        for kind in ("none", "back_calculation")
+    )
+    excess = (runs[f"control_{taken}_back_calculation"] - runs[f"saturated_{taken}_back_calculation"]).abs()
     return {
         "pid.proportional": proportional,
         "pid.integral": integral,
         "pid.overshoot": float(summary["overshoot_printed_back_calculation"]),
+        "statement.pid_overshoot": float(min(summary[f"overshoot_{name}_none"] for name in ripple) > 0),
+        "statement.pid_wound_up": float(any(wound_up)),
+        "statement.pid_coincide": float(excess.max() < SETTLED * limit),
+        "statement.pid_sooner": float(with_it < without),
     }
 
 
@@ -48,21 +72,59 @@ def delay_free(inputs: Inputs) -> dict[str, float]:
     return {"delay_free.tracking_error": 100 * least / reference["amplitude"]}
 
 
+def delay_free_runs(inputs: Inputs) -> dict[str, float]:
+    """Chapter 2 under the printed limits, from rest, with our weights.
+
+    What happens without anti-windup depends on K, and so on the unprinted W_1 and W_2: NaN. With the thesis's it stays
+    bounded, the error growing by no more than 1 % from the first half of the run to the second, while the control is
+    cut at the limits.
+    """
+    runs = delay_free_tables(chapter_2())["delay_free"]
+    error = runs["error_thesis"].abs()
+    early = runs["time_s"] <= runs["time_s"].iloc[-1] / 2
+    cut = runs["saturated_thesis"].abs().max() == printed()["delay_free"]["limit"] < runs["control_thesis"].abs().max()
+    return {
+        "statement.unstable_without": math.nan,
+        "statement.cannot_follow": math.nan,
+        "statement.stays_stable": float(error[~early].max() <= (1 + SETTLED) * error[early].max()),
+        "statement.truncated": float(cut),
+    }
+
+
 def extended(inputs: Inputs) -> dict[str, float]:
     """Chapter 4 from rest, under the limits for which the loop without anti-windup saturates until 4 s.
 
     ``extended.tracking_error``: the largest error after the first second without anti-windup.
     ``extended.recovery_s``: when the loop with the thesis's anti-windup leaves saturation for good.
+
+    Statements: without anti-windup the output differs from the reference by more than 1 % of its amplitude after the
+    first second; with the thesis's the loop leaves saturation, its error stays below 1 % in the last period, and below
+    that without anti-windup; y + y_d is the linear response (Lemma 2).
     """
-    chosen = printed()["extended"]
-    design = design_extended(
-        read_model("implied"), [chosen["reference"]["omega"]], chosen["a"], [(chosen["e"], chosen["f"])]
-    )
-    summary = extended_tables(design)["extended_summary"].set_index("run")
+    summary = extended_tables(chapter_4())["extended_summary"].set_index("run")
+    last = summary["relative_error_percent"]
+    amplitude = printed()["extended"]["reference"]["amplitude"]
     return {
         "extended.tracking_error": float(summary["peak_error_after_1s"]["none"]),
         "extended.recovery_s": float(summary["last_saturation_s"]["thesis"]),
+        "statement.difference_without": float(summary["peak_error_after_1s"]["none"] > SETTLED * amplitude),
+        "statement.recovers": float(np.isfinite(summary["last_saturation_s"]["thesis"])),
+        "statement.error_converges": float(last["thesis"] < 100 * SETTLED),
+        "statement.minimises_error": float(last["thesis"] < last["none"]),
+        "statement.lemma_2": float(_y_lin_is_linear(summary["limit"]["thesis"])),
     }
+
+
+def _y_lin_is_linear(limit: float) -> bool:
+    """Whether y + y_d under saturation is y without, chapter 4 with the thesis's anti-windup, over two periods."""
+    design = chapter_4()
+    reference = thesis_reference("extended", design.reference_omegas)
+    loop = design_loop(design, reference, design.compensator("thesis"))
+    time_s = np.linspace(0.0, 2 * reference.period_s, 1001)
+    cut, linear = (simulate(loop, (-size, size), time_s) for size in (limit, np.finfo(float).max))
+    saturated = np.max(np.abs(cut.control - cut.saturated_control)) > 0
+    distance = np.max(np.abs(cut.outputs["y_lin"] - linear.outputs["output"]))
+    return bool(saturated and distance < NOTHING * reference.amplitude)
 
 
 def least_peak_error(plant: PlantModel, limit: float, amplitude: float, omega: float) -> float:

@@ -43,9 +43,12 @@ def coefficients(name: str, block: Block) -> dict[str, float]:
 
 
 def plant_4_8(inputs: Inputs) -> dict[str, float]:
-    """P of Thesis Eq. (4.8), whose modes are printed as 1 + (2 zeta) s/omega + (s/omega)^2; omega in rad/s."""
+    """P of Thesis Eq. (4.8), whose modes are printed as 1 + (2 zeta) s/omega + (s/omega)^2; omega in rad/s.
+
+    ``P.delay_ms`` is T_d as the sentence after it says it.
+    """
     plant = plant_of(inputs)
-    values = {"P.gain": plant.gain, "P.delay_s": plant.delay_s}
+    values = {"P.gain": plant.gain, "P.delay_s": plant.delay_s, "P.delay_ms": 1e3 * plant.delay_s}
     for side, modes in (("zero", plant.zero_modes), ("pole", plant.pole_modes)):
         for k, mode in enumerate(modes, start=1):
             values |= {f"P.{side}_mode_{k}.two_zeta": 2 * mode.zeta, f"P.{side}_mode_{k}.omega": mode.omega}

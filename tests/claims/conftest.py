@@ -3,11 +3,7 @@
 import pandas as pd
 import pytest
 
-from design.contract import Design
-from design.extended import design_extended
 from experiments.claims import read_ledger, recompute
-from identification.model import IdentifiedModel, read_model
-from identification.thesis import printed
 
 
 @pytest.fixture(scope="session")
@@ -16,16 +12,10 @@ def ledger() -> pd.DataFrame:
 
 
 @pytest.fixture(scope="session")
-def recomputed(ledger: pd.DataFrame) -> pd.DataFrame:
-    return recompute(ledger).set_index("id")
+def judged(ledger: pd.DataFrame) -> pd.DataFrame:
+    return recompute(ledger)
 
 
 @pytest.fixture(scope="session")
-def implied() -> IdentifiedModel:
-    return read_model("implied")
-
-
-@pytest.fixture(scope="session")
-def extended_design(implied: IdentifiedModel) -> Design:
-    chosen = printed()["extended"]
-    return design_extended(implied, [chosen["reference"]["omega"]], chosen["a"], [(chosen["e"], chosen["f"])])
+def recomputed(judged: pd.DataFrame) -> pd.DataFrame:
+    return judged.set_index("id")

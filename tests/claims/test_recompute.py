@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from experiments.__main__ import main
 from experiments.claims import COLUMNS, read_ledger, recompute
-from experiments.claims_inputs import rounded_inputs
+from experiments.claims_inputs import Inputs, rounded_inputs
 from experiments.printed_number import PrintedNumber, read_number
 from identification.files import InputError
 
@@ -33,13 +33,17 @@ def one_row(printed: str, compute: str = THETA2, row_id: str = "theta2.gain") ->
         ("-1.02e-10", -1.02e-10, 5e-13),
         ("1/40", 0.025, 0.0),
         ("no", 0.0, 0.5),
+        ("two", 2.0, 0.0),
+        ("true", 1.0, 0.0),
+        ("pi/2", math.pi / 2, 0.0),
+        ("0..1", 0.5, 0.5),
     ],
 )
 def test_digits(text: str, value: float, half_unit: float):
     assert read_number(text) == PrintedNumber(value, pytest.approx(half_unit, rel=1e-12))
 
 
-@pytest.mark.parametrize("text", ["", "about 4", "nan", "inf", "1/0", "1/x"])
+@pytest.mark.parametrize("text", ["", "about 4", "nan", "inf", "1/0", "1/x", "pi/0", "pi/x", "1..", "..2"])
 def test_text_that_is_no_number_is_refused(text: str):
     with pytest.raises(InputError, match="is not a number"):
         read_number(text)
@@ -72,10 +76,36 @@ def test_nan_is_not_reproducible():
     assert row["verdict"] == "not_reproducible"
 
 
-def test_without_compute_a_row_is_an_input():
+def test_without_compute_a_row_is_unchecked():
     row = recompute(one_row("7.1", "")).iloc[0]
-    assert row["verdict"] == "input"
+    assert row["verdict"] == "unchecked"
     assert math.isnan(row["computed"])
+
+
+def test_an_input_is_transcribed_and_not_reproduced():
+    transcribed = "experiments.claims_inputs:transcribed"
+    row = one_row("7.1", transcribed, "table_2_1.K").assign(kind="input")
+    assert recompute(row).iloc[0]["verdict"] == "input"
+    assert recompute(row.assign(printed="7.2")).iloc[0]["verdict"] == "differs"
+
+
+def test_what_is_printed_twice_is_computed_once():
+    rows = pd.concat([one_row("19.659"), one_row("20", row_id="theta2.gain#2")], ignore_index=True)
+    judged = recompute(rows)
+    assert list(judged["verdict"]) == ["agrees", "agrees"]
+    assert judged["computed"].nunique() == 1
+
+
+def test_a_statement_gets_no_tolerance(monkeypatch: pytest.MonkeyPatch):
+    """Whatever the rounding of the inputs would do to it."""
+
+    def statement(inputs: Inputs) -> dict[str, float]:
+        return {"statement.x": float(inputs["implied.gain"] > 7.105)}
+
+    monkeypatch.setattr("experiments.claims_parameters.gamma_opt", statement)
+    assert recompute(one_row("true", GAMMA_OPT, "statement.x")).iloc[0]["verdict"] == "differs"
+    monkeypatch.setattr("experiments.claims_parameters.gamma_opt", lambda inputs: {"statement.x": 1.0})
+    assert recompute(one_row("true", GAMMA_OPT, "statement.x")).iloc[0]["verdict"] == "agrees"
 
 
 @pytest.mark.parametrize("name", ["experiments.claims_parameters:nothing", "no_such_module:f", "theta2"])
@@ -100,7 +130,7 @@ def test_ledger_with_other_columns_is_refused(tmp_path: Path):
 
 @pytest.fixture
 def small_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    table = pd.concat([one_row("19.659").assign(status="agrees"), one_row("7.1", "", "K").assign(status="input")])
+    table = pd.concat([one_row("19.659").assign(status="agrees"), one_row("7.1", "", "K").assign(status="unchecked")])
     monkeypatch.setattr("experiments.claims.read_ledger", lambda: table.reset_index(drop=True))
     return tmp_path
 
@@ -108,7 +138,7 @@ def small_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_command_writes_the_table_and_prints_counts(small_ledger: Path):
     result = CliRunner().invoke(main, ["claims", "--output", str(small_ledger)])
     assert result.exit_code == 0
-    assert [line.split() for line in result.output.splitlines()[1:]] == [["agrees", "1"], ["input", "1"]]
+    assert [line.split() for line in result.output.splitlines()[1:]] == [["agrees", "1"], ["unchecked", "1"]]
     written = pd.read_csv(small_ledger / "claims.csv")
     assert tuple(written.columns) == (*COLUMNS, "computed", "half_unit", "tolerance", "verdict")
     assert written["computed"].iloc[0] == pytest.approx(19.65906, abs=1e-5)

@@ -1,0 +1,281 @@
+"""Why the statements that do not hold, or cannot be judged, are so: each reason, shown."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.integrate import quad
+
+from design.block import Block, plant_block, plant_denominator
+from design.contract import Design
+from design.extended import design_extended
+from design.mixed_sensitivity import mixed_sensitivity
+from design.robustness import delay_loop, margins_of
+from design.stable_interpolation import by_zeros, conditions
+from experiments import claims_runs
+from experiments.claims_inputs import Inputs, rounded_inputs
+from experiments.claims_interpolation import pade
+from experiments.claims_statements import internal_model_principle, plant_class, popov, smith_predictor
+from experiments.closed_loop import simulate
+from experiments.extended import extended_tables
+from experiments.loops import design_loop
+from experiments.metrics import over_last
+from experiments.pid import STEP, pid_tables
+from experiments.scenarios import thesis_reference
+from identification.frequency_response import read_sweeps
+from identification.model import IdentifiedModel, read_model
+from identification.thesis import DATA, printed
+
+S = 1j * np.geomspace(1e-3, 1e4, 300)
+
+
+@pytest.fixture(scope="module")
+def pid_runs() -> pd.DataFrame:
+    return pid_tables()["pid"]
+
+
+# Section 2.2
+
+
+def test_the_wound_up_control_settles_inside_the_range(pid_runs: pd.DataFrame):
+    """In a steady state u = y/gain; |y| <= gain limit, so that |u| <= limit whatever the step that y can reach."""
+    values = printed()["pid"]
+    time_s = pid_runs["time_s"].to_numpy()
+    middle, half = over_last(time_s, pid_runs["control_swapped_none"].to_numpy(), 5.0)
+    assert middle == pytest.approx(STEP / values["gain"], rel=0.05)
+    assert abs(middle) + half < values["limit"]
+    _, half = over_last(time_s, pid_runs["control_printed_none"].to_numpy(), 20.0)
+    assert half > 10 * values["limit"]
+
+
+def test_u_and_sat_u_coincide_only_later(pid_runs: pd.DataFrame):
+    control, saturated = (pid_runs[f"{name}_swapped_back_calculation"] for name in ("control", "saturated"))
+    apart = pid_runs["time_s"][control != saturated]
+    assert control[0] == 4.5 * STEP
+    assert apart.max() == pytest.approx(37, abs=0.5)
+
+
+# Chapter 2
+
+
+def test_the_controller_of_chapter_2_hides_the_integrator(delay_free_design: Design):
+    """C = K A/Lambda has a zero where P has its pole s = 0, so that a constant at u makes y drift."""
+    plant = delay_free_design.plant.without_delay()
+    A, Lambda = plant_denominator(plant), delay_free_design.blocks["Lambda"]
+    assert 0j in A.zeros
+    assert 0j not in Lambda.zeros
+
+    def from_input_disturbance(s: complex) -> float:
+        C = delay_free_design.blocks["K"](s) * A(s) / Lambda(s)
+        return abs(complex(plant(s) / (1 + plant(s) * C)))
+
+    slope = from_input_disturbance(1e-7) / from_input_disturbance(1e-6)
+    assert slope == pytest.approx(10, rel=1e-3)
+
+
+def test_the_final_value_step_says_of_a_loop_without_internal_model_that_it_tracks():
+    """P = 1/s, C = 1, r = sin(w t): e'(t) = r'(t) - e(t), so that e swings with w/sqrt(1 + w^2), and s E(s) -> 0."""
+    omega, s = 1.5, 1e-9
+    assert s * (s / (s + 1)) * omega / (s**2 + omega**2) < 1e-15
+    t = 40.0
+    phases = [
+        quad(lambda x, at=at: np.exp(x - at) * omega * np.cos(omega * x), 0, at, limit=200)[0]
+        for at in (t, t + np.pi / 2 / omega)
+    ]
+    assert np.hypot(*phases) == pytest.approx(omega / np.hypot(1, omega), rel=1e-6)
+
+
+def test_the_shipped_sweeps_say_that_they_are_synthetic():
+    tests = read_sweeps(sorted((DATA / "elevation").glob("*_frf.csv")))
+    assert len(tests) == 6
+    assert all(test.synthetic for test in tests)
+
+
+def last_errors(design: Design, horizon_s: float, anti_windup: str | None) -> float:
+    """The largest error of the last period under the printed limits, from rest."""
+    reference = thesis_reference("delay-free", design.reference_omegas)
+    kind = design.compensator(anti_windup) if anti_windup else None
+    limit = printed()["delay_free"]["limit"]
+    time_s = np.linspace(horizon_s - reference.period_s, horizon_s, 400)
+    run = simulate(design_loop(design, reference, kind), (-limit, limit), time_s)
+    return float(np.max(np.abs(run.outputs["error"])))
+
+
+@pytest.fixture(scope="module")
+def other_weights(delay_free_design: Design) -> Design:
+    """Chapter 2 with a W2 that is small at low frequencies, as section 2.3.1 allows."""
+    rate, (omega,) = 0.1, delay_free_design.reference_omegas
+    W1 = Block(1.0, (), (-3 * rate + 1j * omega, -3 * rate - 1j * omega, complex(-3 * rate)))
+    W2 = Block(2.5, (-20 + 0j,), (-1000 + 0j,))
+    synthesis = mixed_sensitivity(delay_free_design.blocks["G_A"], W1, W2, rate)
+    return replace(delay_free_design, blocks=delay_free_design.blocks | {"K": synthesis.K})
+
+
+def test_the_loop_without_anti_windup_is_bounded_with_our_weights(delay_free_design: Design):
+    """K is stable; the error is 3 times the amplitude at first and below it after a hundred periods."""
+    assert delay_free_design.blocks["K"].is_stable
+    amplitude = printed()["delay_free"]["reference"]["amplitude"]
+    assert last_errors(delay_free_design, 24.0, None) > 2 * amplitude
+    assert last_errors(delay_free_design, 400.0, None) < 1.5 * amplitude
+
+
+def test_with_other_weights_the_loop_without_anti_windup_follows_as_well_as_with(other_weights: Design):
+    without, with_it = (last_errors(other_weights, 100.0, kind) for kind in (None, "thesis"))
+    assert without < with_it < 4
+    assert without == pytest.approx(1.8, abs=0.1)
+
+
+# Chapter 3
+
+
+@pytest.mark.parametrize(("name", "peak", "at"), [("implied", 8.84, 175), ("table", 0.90, None)])
+def test_the_printed_bound_guarantees_nothing(name: str, peak: float, at: float | None):
+    """For the set behind the printed transfer functions; for Table 2.1 as printed it does, with zeta_n1 = 0.08."""
+    model = read_model(name)
+    design = design_extended(model, [1.5], 4.0, [(2.0, 1.0)])
+    found = margins_of(delay_loop(design, design.loop_plant), model.additive_bound).W_a_C_S
+    assert found.value == pytest.approx(peak, abs=0.005)
+    assert at is None or found.omega == pytest.approx(at, rel=1e-3)
+
+
+def test_a_constant_is_followed_without_a_controller_pole_at_zero(extended_design: Design):
+    """S_s = (s + C_0 (1 - exp(-T_d s)))/(s + C_0): 0 at s = 0 for any C_0; but P S_s is 0 there only with (3.3)."""
+    delay_s = extended_design.plant.delay_s
+    s = np.array([1e-5, 1e-6])
+
+    def S(C_0: np.ndarray) -> np.ndarray:
+        return (s - C_0 * np.expm1(-delay_s * s)) / (s + C_0)
+
+    free, interpolated = np.full(2, 4.0), extended_design.blocks["C0"](s).real
+    assert interpolated == pytest.approx(-1 / delay_s, rel=1e-3)
+    assert S(free) == pytest.approx((1 + 4 * delay_s) * s / 4, rel=1e-4)  # tends to 0: a constant is followed
+    disturbed = {name: np.abs(S(C_0) / s) for name, C_0 in {"free": free, "interpolated": interpolated}.items()}
+    assert disturbed["free"] == pytest.approx((1 + 4 * delay_s) / 4, rel=1e-4)  # of a constant at u something stays
+    assert disturbed["interpolated"][1] == pytest.approx(disturbed["interpolated"][0] / 10, rel=0.01)
+
+
+def test_N_p_at_zero_is_one_over_a(extended_design: Design):
+    """N_p = 1/(s + a), and X = a = 1/N_p(0), with which N_p X + D_p Y = 1 for Y = 1."""
+    a = extended_design.parameters["a"]
+    assert 1 / (0 + a) == 1 / a
+    assert 1 / (S + a) * a + S / (S + a) * 1 == pytest.approx(np.ones(len(S)), rel=1e-14)
+
+
+def test_K_leaves_the_integrator_between_u_lin_and_y(extended_design: Design):
+    """1 + F + P K = 1 - T_so e + T_so e = 1: G_A/(1 + G_A K) = P/(1 + F + P K) = P, which integrates."""
+    plant, T_so, K = extended_design.loop_plant, extended_design.blocks["T_so"], extended_design.blocks["K"]
+    F = -T_so(S) * np.exp(-plant.delay_s * S)
+    G_A = plant(S) / (1 + F)
+    assert G_A / (1 + G_A * K(S)) == pytest.approx(plant(S), rel=1e-9)
+    assert 0j in plant_block(plant).poles
+
+
+def test_the_printed_3_27_is_not_one_plus_P_C_aw(extended_design: Design):
+    plant, T_so = extended_design.loop_plant, extended_design.blocks["T_so"]
+    e, K_0 = np.exp(-plant.delay_s * S), extended_design.blocks["K0"](S)
+    exact = 1 + plant(S) * extended_design.blocks["K"](S) / (1 - T_so(S) * e)
+    mended = (1 - T_so(S) * e + K_0 * e / S) / (1 - T_so(S) * e)
+    assert exact == pytest.approx(mended, rel=1e-9)
+    assert 1 / exact == pytest.approx(1 - T_so(S) * e, rel=1e-9, abs=1e-12)  # (3.28) and its conclusion stand
+    as_printed = 1 - T_so(S) * e / (1 + K_0 * e / S)
+    assert np.max(np.abs(as_printed / exact - 1)) > 0.5
+
+
+# Chapter 4
+
+
+def test_a_first_order_Q_meets_the_conditions_at_high_frequencies():
+    """(b s + c)/(s + f) with c = f Q(0): three real conditions, three coefficients."""
+    delay_s, a = printed()["plants"]["implied"]["delay_s"], printed()["extended"]["a"]
+    stable = {}
+    for omega in (1.5, 2 / delay_s):
+        wanted = conditions([omega], delay_s, a)
+        Q_0, Q_omega = wanted.at_zero, wanted.at_omegas[0]
+        b, f = np.linalg.solve(
+            [[0.0, Q_0 - Q_omega.real], [omega, -Q_omega.imag]], [-omega * Q_omega.imag, omega * Q_omega.real]
+        )
+        s = 1j * omega
+        assert (b * s + f * Q_0) / (s + f) == pytest.approx(Q_omega, rel=1e-9)
+        stable[omega] = f > 0
+    assert stable == {1.5: False, 2 / delay_s: True}
+
+
+def test_the_printed_Q_at_omega_misses_the_condition():
+    chosen, delay_s = printed()["extended"], printed()["plants"]["implied"]["delay_s"]
+    wanted = conditions([1.5], delay_s, chosen["a"])
+    b, c, d = by_zeros(wanted, [(chosen["e"], chosen["f"])]).numerator
+    s = 1j * wanted.omegas[0]
+    numerator = b * s**2 + c * s + d
+    assert numerator / (s**2 + chosen["e"] * s + chosen["f"]) == pytest.approx(wanted.at_omegas[0], rel=1e-12)
+    assert abs(numerator / (d * s**2 + chosen["e"] * s + chosen["f"]) / wanted.at_omegas[0] - 1) > 0.5
+
+
+def test_without_anti_windup_the_error_vanishes_and_with_it_an_offset_stays(extended_design: Design):
+    summary = extended_tables(extended_design)["extended_summary"].set_index("run")
+    assert abs(summary["offset"]["none"]) + summary["ripple"]["none"] < 0.003
+    assert summary["offset"]["thesis"] == pytest.approx(-36, abs=0.5)
+    assert abs(summary["offset"]["corrected"]) + summary["ripple"]["corrected"] < 1e-5
+
+
+# The statements themselves can fail
+
+
+@pytest.fixture
+def inputs(ledger: pd.DataFrame) -> Inputs:
+    return {name: number.value for name, number in rounded_inputs(ledger).items()}
+
+
+def test_statements_are_true_or_false(inputs: Inputs, judged: pd.DataFrame):
+    rows = judged[judged["printed"] == "true"]
+    assert set(rows["computed"].dropna()) == {0.0, 1.0}
+    assert (rows["verdict"][rows["computed"] == 0] == "differs").all()
+
+
+def test_a_plant_of_another_kind_turns_its_statements(inputs: Inputs):
+    """Resonance below anti-resonance, a zero in the right half plane, a damping beyond 1."""
+    assert plant_class(inputs)["statement.resonances"] == 1
+    swapped = {**inputs, "implied.pole_modes.0.omega": 100.0}
+    assert plant_class(swapped)["statement.resonances"] == 0
+    assert plant_class({**inputs, "implied.pole_modes.1.zeta": 1.5})["R0.damping"] == 1.5
+
+
+def test_other_printed_numbers_turn_their_statements(inputs: Inputs, monkeypatch: pytest.MonkeyPatch):
+    """gamma = -1 makes theta2 stable; with T_d ten times as long the Pade coefficients are still 2 and 12."""
+    forgetting = {**printed(), "delay_free": printed()["delay_free"] | {"gamma": -1.0}}
+    monkeypatch.setattr("experiments.claims_statements.printed", lambda: forgetting)
+    assert popov(inputs)["statement.theta2_stable"] == 1
+    longer = pade({**inputs, "implied.delay_s": 0.081})
+    assert (longer["pade.s"], longer["pade.s2"]) == (pytest.approx(2), pytest.approx(12))
+
+
+def test_another_design_turns_its_statements(inputs: Inputs, implied: IdentifiedModel, monkeypatch: pytest.MonkeyPatch):
+    """A robust redesign keeps what is stable and equal, and is robust."""
+    redesigned = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9)
+    before = smith_predictor(inputs)
+    monkeypatch.setattr("experiments.claims_statements.chapter_4", lambda: redesigned)
+    after = smith_predictor(inputs)
+    assert {name for name in before if abs(before[name] - after[name]) > 0.5} == {"statement.robust"}
+
+
+def test_a_lambda_without_the_sinusoid_breaks_lemma_1(
+    inputs: Inputs, delay_free_design: Design, monkeypatch: pytest.MonkeyPatch
+):
+    assert internal_model_principle(inputs)["statement.lemma_1"] == 1
+    other = replace(delay_free_design, blocks=delay_free_design.blocks | {"Lambda": Block(1.0, (-1 + 0j,) * 4)})
+    monkeypatch.setattr("experiments.claims_statements.chapter_2", lambda: other)
+    assert internal_model_principle(inputs)["statement.lemma_1"] == 0
+
+
+def test_the_corrected_anti_windup_turns_the_statements_of_the_runs(
+    inputs: Inputs, extended_design: Design, monkeypatch: pytest.MonkeyPatch
+):
+    """With the corrected compensator in the thesis's place the error converges, and faster than without."""
+    renamed = replace(
+        extended_design, anti_windup=extended_design.anti_windup | {"thesis": extended_design.anti_windup["corrected"]}
+    )
+    monkeypatch.setattr(claims_runs, "chapter_4", lambda: renamed)
+    found = claims_runs.extended(inputs)
+    assert found["statement.error_converges"] == found["statement.minimises_error"] == 1
