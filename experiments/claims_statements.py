@@ -62,7 +62,7 @@ def plant_class(inputs: Inputs) -> Statements:
 
 
 def internal_model_principle(inputs: Inputs) -> Statements:
-    """Lemma 1 for the design of chapter 2, why Lambda needs s^2 + epsilon, and the final value step of the proof.
+    """Lemma 1 for the design of chapter 2, why Lambda needs s^2 + epsilon, the proof's final value step, and R(s).
 
     The final value theorem, taken for a sinusoid as the proof takes it, says of 1/s under unit feedback, which has no
     internal model, that the error vanishes; its amplitude is |S(j omega)|.
@@ -84,13 +84,14 @@ def internal_model_principle(inputs: Inputs) -> Statements:
         "statement.lemma_1": float(abs(S) < NOTHING),
         "statement.epsilon_makes_proper": float(proper["with"] and not proper["without"]),
         "statement.final_value": float((limit < NOTHING) == (amplitude < NOTHING)),
+        "statement.R": float(_is_the_reference(1.5 * omega, 2.5 * omega)),
     }
 
 
 def popov(inputs: Inputs) -> Statements:
-    """Section 2.4: condition ii of Theorem 2.3.1 holds for (2.23) if gamma > -1/k; and theta2 with the printed numbers.
+    """Theorem 2.3.1: condition ii for (2.23) if gamma > -1/k, the dead zone's sector, and the stability of theta2.
 
-    Tried for the printed alpha and beta, several k, and gamma from just above -1/k upwards, with the multiplier alpha.
+    Condition ii is tried for the printed alpha and beta, several k, and gamma from just above -1/k upwards, with the multiplier alpha.
     """
     chosen = printed()["delay_free"]
     alpha, beta = chosen["alpha"], chosen["beta"]
@@ -103,7 +104,23 @@ def popov(inputs: Inputs) -> Statements:
     return {
         "statement.popov": float(min(margins) > 0),
         "statement.theta2_stable": float(theta2.is_stable),
+        "statement.dead_zone": float(0 < _dead_zone(chosen["limit"] / 2, chosen["limit"])),
     }
+
+
+def _dead_zone(u: float, limit: float) -> float:
+    """dz(u) = u - sat(u), Thesis Eq. (2.16)."""
+    return u - min(max(u, -limit), limit)
+
+
+def _is_the_reference(*points: float) -> bool:
+    """Whether the transform of chapter 2's reference is s/(s^2 + omega_1^2) times one number, at some s in rad/s."""
+    chosen = printed()["delay_free"]["reference"]
+    A, phase, omega = chosen["amplitude"], chosen["phase_rad"], 2 * np.pi / chosen["period_s"]
+    s = np.array(points)
+    waves = A * (s * np.sin(phase) + omega * np.cos(phase)) / (s**2 + omega**2)
+    ratio = (waves + chosen["offset"] / s) / (s / (s**2 + omega**2))
+    return bool(np.ptp(ratio) < NOTHING * abs(A))
 
 
 def smith_predictor(inputs: Inputs) -> Statements:
@@ -135,8 +152,16 @@ def smith_predictor(inputs: Inputs) -> Statements:
         "statement.N_p_at_zero": float(_is_one_over_s(a)),
         "statement.pole_at_zero": float(_tracking_needs_pole_at_zero(plant, a)),
         "statement.robust": float(margins_of(loop, design.additive_bound).W_a_C_S.value < 1),
+        "statement.T_si": float(bool(np.allclose(e, 1 / e, rtol=1e-3))),
+        "statement.Z_aw_polynomial": float(_grows_as_a_polynomial(T_so, plant.delay_s)),
         "bezout.Y": float(np.max(np.abs(Y))),
     }
+
+
+def _grows_as_a_polynomial(T_so: Block, delay_s: float) -> bool:
+    """Whether Z_aw/Lambda = s (1 - T_so exp(-T_d s)) grows no faster than s^100 towards s = -infinity."""
+    near, far = (abs(s * (1 - T_so(s) * np.exp(-delay_s * s))) for s in (-100 / delay_s, -200 / delay_s))
+    return bool(far < 2.0**100 * near)
 
 
 def _same_roots(first: np.ndarray, second: np.ndarray) -> bool:

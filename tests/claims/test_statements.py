@@ -88,6 +88,29 @@ def test_the_final_value_step_says_of_a_loop_without_internal_model_that_it_trac
     assert np.hypot(*phases) == pytest.approx(omega / np.hypot(1, omega), rel=1e-6)
 
 
+@pytest.mark.parametrize("limit", [0.5, 10.0])
+def test_the_dead_zone_is_zero_between_the_limits(limit: float):
+    """u dz(u)/u^2 = 1 - limit/|u| beyond them: from 0 to below 1."""
+    u = limit * np.array([-0.9, -0.1, 0.5, 1.0])
+    assert np.all(u - np.clip(u, -limit, limit) == 0)
+    beyond = limit * np.array([-1e6, -2.0, 3.0, 1e3])
+    sector = (beyond - np.clip(beyond, -limit, limit)) / beyond
+    assert sector == pytest.approx(1 - limit / np.abs(beyond), rel=1e-12)
+    assert np.all((sector > 0) & (sector < 1))
+
+
+def test_s2_plus_epsilon_holds_the_offset_that_R_leaves_out(delay_free_design: Design):
+    """The error to a constant of 50 is 50/(1 + K(0) B(0)/(epsilon omega_1^2)), not 0."""
+    chosen = printed()["delay_free"]["reference"]
+    G_A, K = (complex(delay_free_design.blocks[name](0)) for name in ("G_A", "K"))
+    left = abs(chosen["offset"] / (1 + G_A * K))
+    assert 1e-7 < left < 2e-6
+    time_s = np.linspace(0.0, 400.0, 4001)
+    reference = thesis_reference("delay-free", delay_free_design.reference_omegas)
+    run = simulate(design_loop(delay_free_design, reference, None), (-1e9, 1e9), time_s)
+    assert run.outputs["error"][-1] == pytest.approx(chosen["offset"] / (1 + G_A * K).real, rel=0.01)
+
+
 def test_the_shipped_sweeps_say_that_they_are_synthetic():
     tests = read_sweeps(sorted((DATA / "elevation").glob("*_frf.csv")))
     assert len(tests) == 6
@@ -182,6 +205,21 @@ def test_the_printed_3_27_is_not_one_plus_P_C_aw(extended_design: Design):
     assert 1 / exact == pytest.approx(1 - T_so(S) * e, rel=1e-9, abs=1e-12)  # (3.28) and its conclusion stand
     as_printed = 1 - T_so(S) * e / (1 + K_0 * e / S)
     assert np.max(np.abs(as_printed / exact - 1)) > 0.5
+
+
+def test_Z_aw_grows_as_an_exponential(extended_design: Design):
+    """Z_aw/Lambda = s - s T_so exp(-T_d s): its logarithm grows by T_d for each rad/s to the left."""
+    delay_s, T_so = extended_design.plant.delay_s, extended_design.blocks["T_so"]
+    s = np.array([-1e4, -2e4])
+    grown = np.log(np.abs(s - s * T_so(s) * np.exp(-delay_s * s)))
+    assert np.diff(grown)[0] / 1e4 == pytest.approx(delay_s, rel=1e-3)
+
+
+def test_at_the_reference_T_so_is_the_inverse_of_T_si(extended_design: Design):
+    s = 1j * extended_design.reference_omegas[0]
+    T_si = np.exp(-extended_design.plant.delay_s * s)
+    assert complex(extended_design.blocks["T_so"](s)) == pytest.approx(1 / T_si, rel=1e-12)
+    assert abs(T_si - 1 / T_si) > 0.02
 
 
 # Chapter 4
