@@ -90,7 +90,7 @@ def test_makefile_knows_every_figures_tables() -> None:
     from paper_figures.__main__ import figure_module, figure_names
 
     diagrams = set(re.search(r"DIAGRAMS := (.*)", makefile)[1].split())  # type: ignore[index]
-    assert len(figure_names()) == 26
+    assert len(figure_names()) == 27
     for name in figure_names():
         tables = set(figure_module(name).TABLES)
         assert tables <= feeds.get(name, set()), name
