@@ -33,7 +33,7 @@ class AntiWindup:
     one_plus: Block
 
     def theta2(self, plant: PlantModel) -> Block:
-        """theta2 = P (1 + theta1~), Thesis Eq. (2.18) and (3.30); its dead time is the plant's."""
+        """theta2 = P (1 + theta1~), Thesis Eq. (2.18), (3.30); for P, (2.11); its dead time is the plant's."""
         return plant_block(plant) * self.one_plus
 
     def to_dict(self) -> dict[str, Any]:

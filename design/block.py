@@ -94,7 +94,7 @@ class Block:
 
     @property
     def is_stable(self) -> bool:
-        """Whether every pole lies in the open left half plane."""
+        """Whether every pole lies in the open left half plane: of a proper block, Thesis Definition 2.1.1."""
         return not self.unstable_poles
 
     def to_dict(self) -> dict[str, Any]:
@@ -177,7 +177,7 @@ def require_thesis_class(plant: PlantModel, excess: int = 0) -> None:
 
 
 def plant_block(plant: PlantModel) -> Block:
-    """P(s) = B(s)/A(s) exp(-h s) as a block."""
+    """P(s) = B(s)/A(s) exp(-h s) as a block, Thesis Eq. (2.3) and, with its dead time, (3.11)."""
     rational = plant_numerator(plant) * plant_denominator(plant).inverse()
     return Block(rational.gain, rational.zeros, rational.poles, plant.delay_s)
 

@@ -25,7 +25,7 @@ def closed_loop_norm(G: Block, W1: Block, W2: Block, K: Block) -> float:
 
 
 def closed_loop_poles(G: Block, K: Block) -> tuple[complex, ...]:
-    """Roots in rad/s of 1 + G K, including what cancels between the factors (internal stability).
+    """Roots in rad/s of 1 + G K, including what cancels between the factors (internal stability, as in Eq. (3.15)).
 
     Raises
     ------

@@ -58,8 +58,9 @@ def coprime_factors(
 
     Notes
     -----
-    The Bezout equation is the polynomial equation x n + y d = c c', deg x, deg y < deg d, which is linear in
-    the coefficients of x and y with the Sylvester matrix of n and d (Kucera, Discrete Linear Control, 1979).
+    The Bezout equation, Thesis Eq. (3.7) and (3.8), is the polynomial equation x n + y d = c c', deg x, deg y < deg d,
+    which is linear in the coefficients of x and y with the Sylvester matrix of n and d (Kucera, Discrete Linear
+    Control, 1979).
     Where roots of c are poles of the plant, they cancel in D_p: c = d gives P/1 and X = 0, Y = 1. P = 1/(s - a)
     with c = s + a and c' = 1 gives the thesis's example: 1/(s + a), (s - a)/(s + a), 2 a and 1.
     """
@@ -114,7 +115,7 @@ def coprime_factors(
 
 
 def controller(factors: CoprimeFactors, Q: Block) -> Block:
-    """C = (X + D_p Q)/(Y - N_p Q), Thesis Theorem 2.1.1.
+    """C = (X + D_p Q)/(Y - N_p Q), Thesis Theorem 2.1.1; for 1/s Eq. (3.6) and (4.1).
 
     Parameters
     ----------

@@ -93,7 +93,7 @@ def design_extended(
 
     K_0, K_1, K = stabiliser(model.plant, free.T_so, inverse_epsilon)
     F1 = plant_block(model.plant)
-    # W_aw/(K R_0) with W_aw = -s T_so, Eq. (3.29)
+    # W_aw/(K R_0) with W_aw = -s T_so, Eq. (3.16), (3.17), (3.21), (3.29); it is -C_s S_s, (3.23)
     F2 = (free.T_so * plant_denominator(model.plant) * plant_numerator(model.plant).inverse()).scaled(-1.0)
     if recovery_s is None:
         recovery_s = float(np.log(1 / SETTLED)) / a

@@ -41,7 +41,7 @@ def frequency_grid(roots: Iterable[complex], per_decade: int = 60) -> Real:
 
 
 def peak(magnitude: Callable[[Real], Real], roots: Iterable[complex]) -> tuple[float, float]:
-    """The largest value of a magnitude over 0 <= omega <= infinity and where it is reached.
+    """The largest value of a magnitude over 0 <= omega <= infinity and where it is reached: the norm, Thesis Eq. (2.1).
 
     Parameters
     ----------

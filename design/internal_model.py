@@ -44,7 +44,10 @@ class InternalModel:
 
 
 def reference_polynomial(omega: float, epsilon: float) -> Block:
-    """(s^2 + epsilon)(s^2 + omega^2): the sinusoid, and a factor close to it that holds constants (section 2.4)."""
+    """Lambda = (s^2 + epsilon)(s^2 + omega^2) of Thesis Eq. (2.2), with the factor that section 2.4 adds.
+
+    That factor, s^2 + epsilon, holds constants nearly; the other is the sinusoid's.
+    """
     slow = np.sqrt(epsilon)
     return Block(1.0, (1j * slow, -1j * slow, 1j * omega, -1j * omega))
 

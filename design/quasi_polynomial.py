@@ -88,7 +88,7 @@ class DelayLoop:
 
     @property
     def characteristic(self) -> Terms:
-        """The characteristic function without its hidden roots: three polynomials, two of them with a dead time."""
+        """Characteristic function (3.12), (3.5), (3.27), no hidden roots: three polynomials, two of them delayed."""
         return self.denominator, self.inner_loop * self.denominator, self.open_loop * self.denominator
 
     @property
@@ -114,7 +114,7 @@ class CharacteristicRoots(NamedTuple):
 
 
 def rightmost_roots(loop: DelayLoop, count: int) -> CharacteristicRoots:
-    """The hidden roots and the ``count`` or more rightmost of the others, which dead time and feedback move.
+    """The hidden roots and the ``count`` or more rightmost of the others, which dead time and feedback move (3.14).
 
     Parameters
     ----------

@@ -163,7 +163,10 @@ def margins_of(loop: DelayLoop, bound: AdditiveBound) -> Margins:
 
 
 def responses(loop: DelayLoop, omega: Real) -> tuple[Complex, Complex]:
-    """S and C S of a loop at frequencies omega (n,) in rad/s, its dead times exact; finite at the poles of C."""
+    """S and C S of a loop at frequencies omega (n,) in rad/s, its dead times exact; finite at the poles of C.
+
+    Of an extended design S is S_aw of Thesis Eq. (3.25).
+    """
     s = 1j * omega
     inner = 1 - loop.feedback(s) * np.exp(-loop.delay_s * s)
     returned = inner + loop.plant(s) * loop.forward(s)

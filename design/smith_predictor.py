@@ -34,13 +34,13 @@ class FreePart:
 
 
 def free_part(Q: StableFunction, a: float) -> FreePart:
-    """C_0 and T_so from Q, Thesis Eq. (4.2) and (3.19).
+    """C_0 and T_so from Q, Thesis Eq. (3.9), (4.2) and (3.19).
 
     Notes
     -----
     With Q = n/q, (4.2) is C_0 = (a (s + a) q + s n)/((s + a) q - n), and 1 + C_0/s has the numerator
     (s + a)^2 q over that denominator times s, so that T_so = (a (s + a) q + s n)/((s + a)^2 q): nothing cancels
-    by subtraction. At the interpolation points T_so = exp(T_d s).
+    by subtraction. At the interpolation points, where C_0 is (3.3) and (3.4), T_so = exp(T_d s): (3.18) and (3.20).
     """
     shifted = np.polymul([1.0, a], Q.denominator)
     numerator = from_polynomial(np.polyadd(a * shifted, np.polymul([1.0, 0.0], Q.numerator)))
@@ -129,7 +129,10 @@ def stabiliser(plant: PlantModel, T_so: Block, inverse_epsilon: float = 0.0) -> 
 
 
 def smith_controller(plant: PlantModel, C_0: Block, s: ArrayLike) -> Complex:
-    """C_s = (1/(K R_0)) C_0/(1 + C_0 (1 - exp(-T_d s))/s), Thesis Eq. (3.2) with the exact R_0, at ``s`` (rad/s)."""
+    """C_s = (1/(K R_0)) C_0/(1 + C_0 (1 - exp(-T_d s))/s), Thesis Eq. (3.2) with the exact R_0, at ``s`` (rad/s).
+
+    It makes P C_s S_s exp(T_d s) = T_so, Eq. (3.22).
+    """
     s = np.asarray(s, dtype=complex)
     flexible = plant.without_delay()(s) * s  # K R_0
     value = C_0(s)
@@ -137,7 +140,7 @@ def smith_controller(plant: PlantModel, C_0: Block, s: ArrayLike) -> Complex:
 
 
 def anti_windup_controller(plant: PlantModel, K: Block, T_so: Block, s: ArrayLike) -> Complex:
-    """C_aw = K/(1 - T_so exp(-T_d s)), Thesis Eq. (3.31), at ``s`` (rad/s)."""
+    """C_aw = K/(1 - T_so exp(-T_d s)), Thesis Eq. (3.24) and (3.31), at ``s`` (rad/s)."""
     s = np.asarray(s, dtype=complex)
     return np.asarray(K(s) / (1 - T_so(s) * np.exp(-plant.delay_s * s)))
 
@@ -149,6 +152,9 @@ def anti_windup_theta1(theta1_tilde: Block, plant: PlantModel, T_so: Block, s: A
 
 
 def augmented_plant(plant: PlantModel, T_so: Block, s: ArrayLike) -> Complex:
-    """G_A = P/(1 + F) with F = -T_so exp(-T_d s), Thesis section 3.3, at ``s`` (rad/s)."""
+    """G_A = P/(1 + F) with F = -T_so exp(-T_d s), Thesis section 3.3, at ``s`` (rad/s).
+
+    One side of Eq. (2.9), G_A of (2.13), and what K meets in (3.13).
+    """
     s = np.asarray(s, dtype=complex)
     return np.asarray(plant(s) / (1 - T_so(s) * np.exp(-plant.delay_s * s)))

@@ -102,7 +102,7 @@ class StableFunction:
 
 
 def by_zeros(wanted: Conditions, pairs: Sequence[tuple[float, float]]) -> StableFunction:
-    """ "Designing the zeros of Q": the denominator is chosen, the numerator interpolates, Thesis Eq. (4.5)-(4.7).
+    """ "Designing the zeros of Q": the denominator is chosen, the numerator interpolates, Eq. (4.5)-(4.7), Table 4.2.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class DivergenceError(InputError):
 
 
 def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarray) -> Run:
-    """Simulate a loop from t = 0.
+    """Simulate a loop from t = 0; what is left out, u - sat(u), is the dead zone of Thesis Eq. (2.16).
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ def design_loop(
     anti_windup: AntiWindup | None,
     plant: PlantModel | None = None,
 ) -> SaturatedLoop:
-    """The loop of Fig. 2.6 around a design, from rest.
+    """The loop of Fig. 2.6 around a design, from rest, which obeys Thesis Lemma 2 and its steps, Eq. (2.10)-(2.15).
 
     Parameters
     ----------

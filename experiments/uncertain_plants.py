@@ -105,7 +105,10 @@ class PlantsWithin:
             )
 
     def draw(self, seed: int, index: int) -> Member:
-        """Plant ``index`` of a seed, whatever else is drawn, and wherever; raises InputError when there is none."""
+        """Plant ``index`` of a seed, whatever else is drawn, and wherever: a G_Delta of Thesis Eq. (2.7).
+
+        Raises InputError when there is none.
+        """
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
         corner = random.uniform(*self._corners)
         direction = random.standard_normal(self._count) * self._units

@@ -112,6 +112,8 @@ def bound_residuals(
 ) -> BoundReport:
     """W_a that covers |P - test| at every line, and between lines as far as the tests' fits say something.
 
+    At the lines this is Thesis Eq. (2.21).
+
     Parameters
     ----------
     plant
