@@ -25,6 +25,7 @@ BENCH_READY := .venv/.bench-ready
 RESULTS := $(BUILD)/results
 FIGURES := $(BUILD)/figures
 SUMMARY := $(addprefix $(BUILD)/summary.,pdf svg png txt)
+REPORT := $(BUILD)/report/index.html
 THESIS := data/thesis/thesis.toml
 
 # The model that everything downstream is for: the one fitted from SWEEPS, unless MODEL names another.
@@ -55,7 +56,7 @@ ENGINE := $(addprefix experiments/,__main__.py tables.py closed_loop.py compiled
 	propagator.py mesh.py crossings.py loops.py scenarios.py metrics.py)
 TRACKING := $(ENGINE) $(addprefix experiments/,tracking.py pade.py)
 
-.PHONY: help figures refit claims test bench study lint clean
+.PHONY: help figures report refit claims test bench study lint clean
 help: ## say what there is
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 	@echo
@@ -65,13 +66,15 @@ help: ## say what there is
 	@echo 'make refit ... LIMIT=5    under other saturation limits than the thesis'"'"'s'
 	@echo 'make ... PLANTS=10000         as many plants drawn within W_a, 200 otherwise (Fig. A.6)'
 
-figures: $(foreach format,$(FORMATS),$(NAMES:%=$(FIGURES)/%.$(format))) ## draw the thesis's figures and A.1 to A.6 into build/figures
+figures: $(foreach format,$(FORMATS),$(NAMES:%=$(FIGURES)/%.$(format))) ## draw the thesis's figures and A.1 to A.7 into build/figures
+
+report: $(REPORT) ## put verdicts, figures with data, ledger, fit, audits and hashes on one page, build/report/index.html
 
 refit: ## fit SWEEPS="a.csv b.csv", design, simulate, draw and sum up for that plant into OUT
 	+@$(MAKE) --no-print-directory REFIT=yes BUILD='$(OUT)' MODEL= SWEEPS='$(SWEEPS)' NAMES='$(DATA_NAMES)' \
 		figures '$(OUT)/summary.pdf'
 
-claims: $(BUILD)/claims.txt ## recompute the numbers that the thesis prints and say which agree
+claims: $(BUILD)/claims.txt docs/equations.md ## recompute what the thesis claims and say what agrees: build/claims.csv and CLAIMS.md
 	@cat $<
 
 test: lint ## check style, types and everything else
@@ -108,7 +111,7 @@ $(BENCH_READY): requirements-bench.lock $(READY)
 ifeq (,$(filter grouped-target,$(.FEATURES)))
 $(error GNU make 4.3 or newer is needed, found $(MAKE_VERSION))
 endif
-ifneq (,$(filter figures $(BUILD)/%,$(MAKECMDGOALS)))
+ifneq (,$(filter figures report $(BUILD)/%,$(MAKECMDGOALS)))
 MISSING := $(filter-out $(FITTED) $(wildcard $(SWEEPS) $(MODEL_FILE)),$(SWEEPS) $(MODEL_FILE))
 $(if $(MISSING),$(error $(MISSING): no such file; expected sweep files in SWEEPS, or table, implied or a model.json in MODEL))
 $(if $(SWEEPS),,$(error SWEEPS is empty; expected one or more sweep files))
@@ -207,9 +210,19 @@ DISTRIBUTIONS := $(call tables,campaign) $(RESULTS)/campaign_distance.csv
 $(DISTRIBUTIONS) &: $(CAMPAIGN) experiments/campaign_tables.py | $(READY)
 	$(call attempt,$(PY) -m experiments campaign-tables $< --output $(RESULTS),$(DISTRIBUTIONS),$<)
 
-$(BUILD)/claims.csv $(BUILD)/claims.txt &: data/thesis/claims.csv $(wildcard experiments/*.py design/*.py) $(CONTRACT) | $(READY)
+# What the thesis does not print: about its text, whatever the MODEL.
+CONDITIONS := $(TRACKING) $(addprefix experiments/,unprinted_conditions.py unprinted_weights.py joint_conditions.py \
+	initial_output.py printed_outcomes.py printed_number.py claims.py claims_inputs.py claims_runs.py pid.py extended.py delay_free.py)
+$(call tables,conditions) &: $(CONDITIONS) $(wildcard design/*.py) $(CONTRACT) data/thesis/claims.csv | $(READY)
+	$(PY) -m experiments conditions --output $(RESULTS)
+
+LEDGER := $(addprefix data/thesis/,claims.csv coverage.json)
+$(BUILD)/claims.csv $(BUILD)/claims.txt CLAIMS.md &: $(LEDGER) $(wildcard experiments/*.py design/*.py) $(CONTRACT) | $(READY)
 	@mkdir -p $(BUILD)
-	$(PY) -m experiments claims --output $(BUILD) > $(BUILD)/claims.txt
+	$(PY) -m experiments claims --output $(BUILD) --page CLAIMS.md > $(BUILD)/claims.txt
+
+docs/equations.md: data/thesis/equations.csv experiments/equations_page.py | $(READY)
+	@$(PY) -m experiments equations --page $@
 
 define feeds
 $(call drawing,$(2)): $(call tables,$(1))
@@ -228,12 +241,13 @@ $(eval $(call feeds,limits_extended,fig_a_04))
 $(eval $(call feeds,sampled,fig_a_05))
 $(eval $(call feeds,campaign,fig_a_06))
 $(call drawing,fig_a_06): $(RESULTS)/campaign_distance.csv
+$(eval $(call feeds,conditions,fig_a_07))
 
 $(call drawing,fig_2_02 fig_2_03 fig_2_04): $(addprefix paper_figures/,pid.py panels.py captions.py)
 $(call drawing,fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14): $(addprefix paper_figures/,panels.py captions.py)
 $(call drawing,fig_2_10 fig_2_11): paper_figures/f_gamma.py
 $(call drawing,fig_4_01 fig_4_02 fig_4_03 fig_4_04): $(addprefix paper_figures/,extended.py panels.py captions.py)
-$(call drawing,fig_a_01 fig_a_02 fig_a_03 fig_a_04 fig_a_05 fig_a_06): $(addprefix paper_figures/,panels.py captions.py)
+$(call drawing,fig_a_01 fig_a_02 fig_a_03 fig_a_04 fig_a_05 fig_a_06 fig_a_07): $(addprefix paper_figures/,panels.py captions.py)
 
 DIAGRAMS := fig_2_01 fig_2_05 fig_2_06 fig_2_07 fig_2_08 fig_3_01 fig_3_02
 $(call drawing,$(DIAGRAMS)): paper_figures/block_diagrams.py
@@ -246,3 +260,9 @@ $(foreach format,$(FORMATS),$(FIGURES)/%.$(format)): paper_figures/%.py $(STYLE)
 $(SUMMARY) &: $(FITTED) $(CHOICE) $(SWEEP_FILES) $(DESIGNS) $(foreach table,$(TABLES),$(call tables,$(table))) \
 		$(wildcard paper_figures/summary*.py) $(addprefix paper_figures/,panels.py captions.py) $(STYLE) | $(READY)
 	$(PY) -m paper_figures summary $(FITTED) $(SWEEPS) --build $(BUILD)
+
+$(REPORT): $(foreach format,svg txt,$(NAMES:%=$(FIGURES)/%.$(format))) $(BUILD)/claims.csv $(MODEL_FILE) $(CHOICE) $(SWEEP_FILES) \
+		$(DESIGNS) $(foreach table,pid $(TABLES),$(call tables,$(table))) $(INTERPOLATION) $(DISTRIBUTIONS) requirements.lock \
+		$(THESIS) data/thesis/claims.csv $(wildcard paper_figures/report* paper_figures/summary_of_*.py design/*.py) \
+		paper_figures/captions.py $(STYLE) | $(READY)
+	$(PY) -m paper_figures report $(CHOSEN) $(SWEEPS) --build $(BUILD)

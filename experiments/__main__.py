@@ -15,6 +15,7 @@ from tqdm import tqdm
 from design.contract import Design, read_design
 from experiments.campaign_command import campaign_command
 from experiments.campaign_tables import campaign_tables
+from experiments.claims_commands import claims_command, coverage_command, equations_command
 from experiments.delay_free import delay_free_tables
 from experiments.extended import extended_tables
 from experiments.interpolation_regions import interpolation_tables
@@ -39,6 +40,9 @@ def main() -> None:
 main.add_command(simulate_command)
 main.add_command(sampled_command)
 main.add_command(campaign_command)
+main.add_command(claims_command)
+main.add_command(coverage_command)
+main.add_command(equations_command)
 
 
 @main.command("pid")
@@ -120,6 +124,18 @@ def limits(design: Path, limits: tuple[float, ...], output: Path) -> None:
         _write(output, limits_tables(content, limits or None, bar.update))
 
 
+@main.command("conditions")
+@OUTPUT_FOLDER
+def conditions(output: Path) -> None:
+    """What the thesis does not print, searched by what it does: conditions.csv, conditions_summary.csv."""
+    from experiments.unprinted_conditions import conditions_tables
+
+    if not output.is_dir():
+        raise InputError(f"{output}: no such folder")
+    with tqdm(desc="conditions", unit="", disable=None, leave=False) as bar:
+        _write(output, conditions_tables(tick=bar.update))
+
+
 @main.command("sampled-rates")
 @DESIGN
 @LIMIT
@@ -149,21 +165,6 @@ def additive_error(model: str, sweeps: tuple[Path, ...], output: Path) -> None:
     from identification.frequency_response import read_sweeps
 
     _write(output, additive_error_tables(read_model(model), read_sweeps(sweeps)))
-
-
-@main.command("claims")
-@OUTPUT_FOLDER
-def claims(output: Path) -> None:
-    """The numbers that the thesis prints, computed again: claims.csv."""
-    from experiments.claims import read_ledger, recompute
-
-    table = recompute(read_ledger())
-    _write(output, {"claims": table})
-    click.echo(f"{len(table)} printed numbers -> {output / 'claims.csv'}")
-    for verdict, count in table["verdict"].value_counts().items():
-        click.echo(f"  {verdict:17s}{count:4d}")
-    for row in table[table["verdict"] != table["status"]].itertuples():
-        click.echo(f"  {row.id}: the ledger says {row.status}, recomputed it {row.verdict}")
 
 
 def _of_kind(path: Path, kind: str) -> Design:

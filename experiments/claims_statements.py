@@ -91,7 +91,8 @@ def internal_model_principle(inputs: Inputs) -> Statements:
 def popov(inputs: Inputs) -> Statements:
     """Theorem 2.3.1: condition ii for (2.23) if gamma > -1/k, the dead zone's sector, and the stability of theta2.
 
-    Condition ii is tried for the printed alpha and beta, several k, and gamma from just above -1/k upwards, with the multiplier alpha.
+    Condition ii is tried for the printed alpha and beta, several k, and gamma from just above -1/k upwards, with the
+    multiplier alpha.
     """
     chosen = printed()["delay_free"]
     alpha, beta = chosen["alpha"], chosen["beta"]
@@ -104,7 +105,7 @@ def popov(inputs: Inputs) -> Statements:
     return {
         "statement.popov": float(min(margins) > 0),
         "statement.theta2_stable": float(theta2.is_stable),
-        "statement.dead_zone": float(0 < _dead_zone(chosen["limit"] / 2, chosen["limit"])),
+        "statement.dead_zone": float(_dead_zone(chosen["limit"] / 2, chosen["limit"]) > 0),
     }
 
 
@@ -153,6 +154,7 @@ def smith_predictor(inputs: Inputs) -> Statements:
         "statement.pole_at_zero": float(_tracking_needs_pole_at_zero(plant, a)),
         "statement.robust": float(margins_of(loop, design.additive_bound).W_a_C_S.value < 1),
         "statement.T_si": float(bool(np.allclose(e, 1 / e, rtol=1e-3))),
+        "statement.T_so_3_21": float(_W_follows_at_all_s(T_so, design.reference_omegas[0])),
         "statement.Z_aw_polynomial": float(_grows_as_a_polynomial(T_so, plant.delay_s)),
         "bezout.Y": float(np.max(np.abs(Y))),
     }
@@ -162,6 +164,16 @@ def _grows_as_a_polynomial(T_so: Block, delay_s: float) -> bool:
     """Whether Z_aw/Lambda = s (1 - T_so exp(-T_d s)) grows no faster than s^100 towards s = -infinity."""
     near, far = (abs(s * (1 - T_so(s) * np.exp(-delay_s * s))) for s in (-100 / delay_s, -200 / delay_s))
     return bool(far < 2.0**100 * near)
+
+
+def _W_follows_at_all_s(T_so: Block, omega: float) -> bool:
+    """Whether every stable W_aw that meets (3.18) is -s T_so: that plus (s^2 + omega^2)/(s + omega)^2 meets it too."""
+
+    def other(s: complex) -> complex:
+        return -s * complex(T_so(s)) + (s**2 + omega**2) / (s + omega) ** 2
+
+    at_omega, elsewhere = (abs(other(s) + s * complex(T_so(s))) for s in (1j * omega, 2j * omega))
+    return not (at_omega < NOTHING < elsewhere)
 
 
 def _same_roots(first: np.ndarray, second: np.ndarray) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 import pandas as pd
@@ -11,13 +11,10 @@ from identification.files import write_whole
 
 
 def write_tables(tables: Mapping[Path, pd.DataFrame], inputs: Iterable[Path] = ()) -> None:
-    """Write tables as CSV with 12 significant digits, all of them or none; NaN is written as an empty cell."""
-    write_whole(
-        {
-            path: lambda partial, table=table: table.to_csv(  # type: ignore[misc]
-                partial, index=False, float_format="%.12g", lineterminator="\n"
-            )
-            for path, table in tables.items()
-        },
-        inputs,
-    )
+    """Write tables as CSV, all of them or none, see :func:`csv_writer`."""
+    write_whole({path: csv_writer(table) for path, table in tables.items()}, inputs)
+
+
+def csv_writer(table: pd.DataFrame) -> Callable[[Path], object]:
+    """What writes a table as CSV with 12 significant digits; NaN is written as an empty cell."""
+    return lambda path: table.to_csv(path, index=False, float_format="%.12g", lineterminator="\n")

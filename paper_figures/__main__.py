@@ -1,4 +1,4 @@
-"""The command line of the figures: ``python -m paper_figures draw`` and ``python -m paper_figures summary``."""
+"""The command line of the figures: ``python -m paper_figures`` with draw, summary and report."""
 
 from __future__ import annotations
 
@@ -94,6 +94,35 @@ def summary_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
     click.echo(f"{len(tests)} test{'s' if len(tests) > 1 else ''} -> {build / 'summary.pdf'}")
     for head, sentence in said.refused:
         click.echo(f"{head}: {sentence}")
+
+
+@main.command("report")
+@click.argument("model")
+@click.argument("sweeps", metavar="[SWEEP]...", nargs=-1, type=click.Path(path_type=Path))
+@click.option(
+    "--build",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="Existing folder of claims.csv, the designs, results and figures; to write report/index.html to.",
+)
+def report_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
+    """Put all that was made for MODEL (a model.json, table or implied) and SWEEP files on one page of HTML."""
+    # only here, as above
+    from design.contract import read_design
+    from paper_figures.report import write_report
+    from paper_figures.report_content import report_content
+    from paper_figures.report_inputs import read_inputs
+    from paper_figures.summary_of_designs import FOLLOWING
+
+    designs = read_attempts({name: build / f"design_{name}" for name in FOLLOWING}, ".json", read_design)
+    experiments = [name for names in FOLLOWING.values() for name in names]
+    outcomes = read_attempts({name: build / "results" / name for name in experiments}, "_summary.csv", read_table)
+    figures = {name: figure_module(name).TABLES for name in figure_names()}
+    inputs = read_inputs(model, sweeps, build, figures, designs, outcomes)
+    tables = {f"{name}_summary": table for name, table in outcomes.items() if isinstance(table, pd.DataFrame)}
+    with missing_columns_named(tables, build / "results", "report"):
+        content = report_content(inputs)
+    click.echo(f"{len(content.rows)} claims, {len(figures)} figures -> {write_report(content, build)}")
 
 
 def figure_names() -> list[str]:

@@ -155,3 +155,15 @@ def test_command_refuses_a_missing_folder(small_ledger: Path):
     result = CliRunner().invoke(main, ["claims", "--output", str(small_ledger / "absent")])
     assert result.exit_code == 2
     assert "no such folder" in result.output
+
+
+def test_command_writes_the_page_and_the_table_or_neither(small_ledger: Path):
+    page = small_ledger / "CLAIMS.md"
+    result = CliRunner().invoke(main, ["claims", "--output", str(small_ledger), "--page", str(page)])
+    assert result.exit_code == 0
+    assert "| `theta2.gain` | 19.659 | 19.659 |" in page.read_text(encoding="utf-8")
+    (small_ledger / "claims.csv").unlink()
+    nowhere = small_ledger / "absent" / "CLAIMS.md"
+    result = CliRunner().invoke(main, ["claims", "--output", str(small_ledger), "--page", str(nowhere)])
+    assert result.exit_code == 2
+    assert not (small_ledger / "claims.csv").exists()

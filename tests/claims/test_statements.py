@@ -222,6 +222,20 @@ def test_at_the_reference_T_so_is_the_inverse_of_T_si(extended_design: Design):
     assert abs(T_si - 1 / T_si) > 0.02
 
 
+def test_3_21_is_a_choice(extended_design: Design):
+    """Another stable W_aw meets (3.18), makes 1 + P F_2 vanish at 0 and j omega_d too, and is not -s T_so."""
+    (omega,), T_so = extended_design.reference_omegas, extended_design.blocks["T_so"]
+    delay_s = extended_design.plant.delay_s
+
+    def W(s: complex, share: float) -> complex:
+        return -s * complex(T_so(s)) + share * s * (s**2 + omega**2) / (s + 1) ** 3
+
+    for share in (0.0, 3.0):
+        s = 1j * omega
+        assert W(s, share) == pytest.approx(-s * np.exp(delay_s * s), rel=1e-12)  # (3.18)
+    assert abs(W(3j, 3.0) - W(3j, 0.0)) > 0.5
+
+
 # Chapter 4
 
 

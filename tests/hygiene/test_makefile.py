@@ -59,5 +59,16 @@ def test_missing_files_are_refused_before_anything_is_made(build: Path, argument
 def test_every_target_is_in_the_help() -> None:
     text = make("help").stdout
     assert all(
-        f"\n{name} " in f"\n{text}" for name in ["help", "figures", "refit", "claims", "test", "bench", "lint", "clean"]
+        f"\n{name} " in f"\n{text}"
+        for name in ["help", "figures", "report", "refit", "claims", "test", "bench", "lint", "clean"]
     )
+
+
+def test_the_report_draws_every_figure_and_judges_the_ledger_first(build: Path) -> None:
+    result = make("-n", "MODEL=implied", f"BUILD={build}", "report")
+    assert result.returncode == 0, result.stderr
+    steps = result.stdout
+    assert all(f"draw {path.stem} " in steps for path in (ROOT / "paper_figures").glob("fig_*.py"))
+    assert "experiments claims" in steps
+    assert "paper_figures report implied data/elevation/" in steps.splitlines()[-1]
+    assert not build.exists()

@@ -1,0 +1,80 @@
+"""The commands about the thesis's text: ``claims``, ``coverage`` and ``equations``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from experiments.tables import csv_writer
+from identification.files import InputError, read_text, write_whole
+
+PAGE = click.Path(path_type=Path, dir_okay=False)
+
+
+@click.command("claims")
+@click.option(
+    "--output", type=click.Path(path_type=Path, file_okay=False), required=True, help="Existing folder for claims.csv."
+)
+@click.option("--page", type=PAGE, help="Markdown file to write the page to.")
+def claims_command(output: Path, page: Path | None) -> None:
+    """What the thesis claims, computed again: claims.csv, and a page to read."""
+    from experiments.claims import read_ledger, recompute
+    from experiments.claims_coverage import read_record
+    from experiments.claims_page import claims_page
+
+    if not output.is_dir():
+        raise InputError(f"{output}: no such folder")
+    table = recompute(read_ledger())
+    path = output / "claims.csv"
+    writers: dict[Path, Callable[[Path], object]] = {path: csv_writer(table)}
+    if page:
+        writers[page] = _text_writer(claims_page(table, read_record()))
+    write_whole(writers)
+    click.echo(f"{len(table)} claims -> {path}")
+    for verdict, count in table["verdict"].value_counts().items():
+        click.echo(f"  {verdict:17s}{count:4d}")
+    for row in table[table["verdict"] != table["status"]].itertuples():
+        click.echo(f"  {row.id}: the ledger says {row.status}, recomputed it {row.verdict}")
+
+
+@click.command("coverage")
+@click.argument("text", type=PAGE)
+@click.option("--record", type=PAGE, help="JSON file to keep the counts in.")
+def coverage_command(text: Path, record: Path | None) -> None:
+    """List the numbers in the thesis's TEXT that no claim quotes; exit status 1 if there is one, or a quote is not."""
+    from experiments.claims import read_ledger
+    from experiments.claims_coverage import LEFT, coverage, coverage_record, quotes_missing_from, read_exceptions
+
+    content, ledger, exceptions = read_text(text), read_ledger(), read_exceptions()
+    covered = coverage(content, ledger, exceptions)
+    counts = coverage_record(content, covered, ledger, exceptions)
+    if record:
+        write_whole({record: _text_writer(json.dumps(counts, indent=2) + "\n")}, [text])
+    click.echo(f"{text}: {counts['numbers']} numbers")
+    for status, count in counts["statuses"].items():
+        click.echo(f"  {status:17s}{count:4d}")
+    left, missing = covered[covered["status"] == LEFT], quotes_missing_from(content, ledger)
+    for row in left.itertuples():
+        click.echo(f"line {row.line}: {row.number} is quoted by no claim: {row.context}")
+    for claim in missing:
+        click.echo(f"{claim}: its quote does not stand in the text")
+    if len(left) or missing:
+        raise SystemExit(1)
+
+
+@click.command("equations")
+@click.option("--page", type=PAGE, required=True, help="Markdown file to write the page to.")
+def equations_command(page: Path) -> None:
+    """Each equation, lemma, theorem, table and figure of the thesis with its function and its test, as a page."""
+    from experiments.equations_page import equations_page, read_equations
+
+    table = read_equations()
+    write_whole({page: _text_writer(equations_page(table))})
+    click.echo(f"{len(table)} labels -> {page}")
+
+
+def _text_writer(text: str) -> Callable[[Path], object]:
+    return lambda partial: partial.write_text(text, encoding="utf-8")
