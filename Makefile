@@ -134,7 +134,7 @@ tables = $(addprefix $(RESULTS)/$(1),.csv _summary.csv)
 drawing = $(foreach format,$(FORMATS),$(1:%=$(FIGURES)/%.$(format)))
 
 $(FITTED): $(SWEEP_FILES) $(IDENTIFICATION) $(if $(MODEL),,$(CHOICE)) | $(READY)
-	$(if $(REFIT),@rm -rf $@ $(SUMMARY) $(call drawing,$(NAMES)) $(BUILD)/design_* $(TABLES:%=$(RESULTS)/%*))
+	$(if $(REFIT),@rm -rf $@ $(SUMMARY) $(REPORT) $(call drawing,$(DATA_NAMES)) $(BUILD)/design_* $(TABLES:%=$(RESULTS)/%*))
 	$(PY) -m identification fit $(SWEEPS) $(FIT) --output $@
 
 # Chapter 2 and chapters 3 and 4, with the thesis's references and free parameters.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from bisect import bisect
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -87,9 +88,10 @@ def coverage(text: str, ledger: pd.DataFrame, exceptions: pd.DataFrame) -> pd.Da
                 for number in re.finditer(pattern, found[0]):
                     status |= dict.fromkeys(range(found.start() + number.start(), found.start() + number.end()), QUOTED)
     numbers = list(NUMBER.finditer(text))
+    line_ends = [end.start() for end in re.finditer("\n", text)]
     return pd.DataFrame(
         {
-            "line": [text.count("\n", 0, number.start()) + 1 for number in numbers],
+            "line": [bisect(line_ends, number.start()) + 1 for number in numbers],
             "number": [number[0] for number in numbers],
             "context": [
                 " ".join(text[max(0, number.start() - CONTEXT) : number.end() + CONTEXT].split()) for number in numbers
