@@ -351,3 +351,13 @@ def test_from_rest_no_offset_settles_when_the_thesis_says(implied_exact: Conditi
     for band in (0.5, 1.0, 2.5):
         settled = [settled_s(time_s, error + offset, band) for offset in np.linspace(-0.999, 0.999, 401) * band]
         assert min(abs(at - 4.46) for at in settled) > 0.3
+
+
+def test_without_anti_windup_the_printed_recovery_occurs_near_what_tracking_takes(implied_exact: Conditions) -> None:
+    time_s = np.linspace(0.0, 12.0, 12001)
+    settled = [
+        settled_s(time_s, simulate(implied_exact.loop("none", 50.0), (-limit, limit), time_s).outputs["error"], 0.5)
+        for limit in (10.6, 10.62)
+    ]
+    assert settled[0] == pytest.approx(4.47, abs=0.005)
+    assert settled[1] < 4.46
