@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from design.block import Block
+from design.quasi_polynomial import DelayLoop, rightmost_roots
 from experiments.claims_inputs import Inputs, plant_of
 from experiments.claims_statements import NOTHING, chapter_2, chapter_4
 from experiments.closed_loop import simulate
@@ -29,8 +31,9 @@ def pid(inputs: Inputs) -> dict[str, float]:
     Without anti-windup Fig. 2.2 has a step response with an overshoot; of the printed gains and the swapped ones
     those are taken that end nearer to the step. The overshoot, in percent, is the one with back-calculation.
 
-    Statements: without anti-windup the output overshoots, and the control settles outside the actuator's range, with
-    either gains; with it u and sat(u) coincide, and the output settles sooner, with the gains that are taken.
+    Statements: the printed gains stabilise the plant; without anti-windup the output overshoots, and the control
+    settles outside the actuator's range, with either gains; with it u and sat(u) coincide, and the output settles
+    sooner, with the gains that are taken.
     """
     tables = pid_tables()
     runs, summary = tables["pid"], tables["pid_summary"].iloc[0]
@@ -56,11 +59,20 @@ def pid(inputs: Inputs) -> dict[str, float]:
         "pid.proportional": proportional,
         "pid.integral": integral,
         "pid.overshoot": float(summary["overshoot_printed_back_calculation"]),
+        "statement.pid_stabilises": float(bool(np.all(rightmost_roots(_pid_linear_loop(*gains), 1).roots.real < 0))),
         "statement.pid_overshoot": float(min(summary[f"overshoot_{name}_none"] for name in ripple) > 0),
         "statement.pid_wound_up": float(any(wound_up)),
         "statement.pid_coincide": float(excess.max() < SETTLED * limit),
         "statement.pid_sooner": float(with_it < without),
     }
+
+
+def _pid_linear_loop(proportional: float, integral: float) -> DelayLoop:
+    """The benchmark's plant with C = P + I/s, without saturation."""
+    values = printed()["pid"]
+    lag = 1 / values["time_constant_s"]
+    plant = Block(values["gain"] * lag, (), (complex(-lag),), values["delay_s"])
+    return DelayLoop(plant, Block(proportional, (complex(-integral / proportional),), (0j,)), Block(0.0), 0.0)
 
 
 def delay_free(inputs: Inputs) -> dict[str, float]:
@@ -75,9 +87,9 @@ def delay_free(inputs: Inputs) -> dict[str, float]:
 def delay_free_runs(inputs: Inputs) -> dict[str, float]:
     """Chapter 2 under the printed limits, from rest, with our weights.
 
-    What happens without anti-windup depends on K, and so on the unprinted W_1 and W_2: NaN. With the thesis's it stays
-    bounded, the error growing by no more than 1 % from the first half of the run to the second, while the control is
-    cut at the limits.
+    What happens without anti-windup, and with a dead time, depends on K, and so on the unprinted W_1 and W_2: NaN.
+    With the thesis's it stays bounded, the error growing by no more than 1 % from the first half of the run to the
+    second, while the control is cut at the limits.
     """
     runs = delay_free_tables(chapter_2())["delay_free"]
     error = runs["error_thesis"].abs()
@@ -86,6 +98,7 @@ def delay_free_runs(inputs: Inputs) -> dict[str, float]:
     return {
         "statement.unstable_without": math.nan,
         "statement.cannot_follow": math.nan,
+        "statement.no_dead_time": math.nan,
         "statement.stays_stable": float(error[~early].max() <= (1 + SETTLED) * error[early].max()),
         "statement.truncated": float(cut),
     }

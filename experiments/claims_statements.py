@@ -61,6 +61,16 @@ def plant_class(inputs: Inputs) -> Statements:
     }
 
 
+def example(inputs: Inputs) -> Statements:
+    """The example of section 2.1, P = 1/(s - a): its controller stabilises for several a > 0 and constants Q."""
+    roots = []
+    for a in (0.1, 1.0, 10.0):
+        for Q in (-5.0, 0.0, 3.0):
+            C = np.array([2 * a + Q, 2 * a**2 - a * Q]), np.array([1.0, a - Q])  # numerator, denominator
+            roots.append(np.roots(np.polyadd(np.polymul([1.0, -a], C[1]), C[0])))
+    return {"statement.example": float(all(np.all(found.real < 0) for found in roots))}
+
+
 def internal_model_principle(inputs: Inputs) -> Statements:
     """Lemma 1 for the design of chapter 2, why Lambda needs s^2 + epsilon, the proof's final value step, and R(s).
 
@@ -89,7 +99,7 @@ def internal_model_principle(inputs: Inputs) -> Statements:
 
 
 def popov(inputs: Inputs) -> Statements:
-    """Theorem 2.3.1: condition ii for (2.23) if gamma > -1/k, the dead zone's sector, and the stability of theta2.
+    """Theorem 2.3.1: condition ii for (2.23) if gamma > -1/k, the dead zone's sector, what is stable of the proof.
 
     Condition ii is tried for the printed alpha and beta, several k, and gamma from just above -1/k upwards, with the
     multiplier alpha.
@@ -105,8 +115,14 @@ def popov(inputs: Inputs) -> Statements:
     return {
         "statement.popov": float(min(margins) > 0),
         "statement.theta2_stable": float(theta2.is_stable),
+        "statement.inverse_stable": float(chapter_2_inverse().is_stable),
         "statement.dead_zone": float(_dead_zone(chosen["limit"] / 2, chosen["limit"]) > 0),
     }
+
+
+def chapter_2_inverse() -> Block:
+    """1/(1 + F) = A/Lambda of chapter 2, Thesis Eq. (2.4)."""
+    return plant_denominator(chapter_2().plant) * chapter_2().blocks["Lambda"].inverse()
 
 
 def _dead_zone(u: float, limit: float) -> float:
@@ -135,6 +151,7 @@ def smith_predictor(inputs: Inputs) -> Statements:
     C_aw = anti_windup_controller(plant, K, T_so, GRID)
     C_s = smith_controller(plant, C_0, GRID)
     K_0 = design.blocks["K0"](GRID)
+    margins = margins_of(loop, design.additive_bound)
     one_plus_PC = 1 + plant(GRID) * C_aw
     printed_3_27 = 1 - T_so(GRID) * e / (1 + K_0 * e / GRID)
     a = printed()["extended"]["a"]
@@ -152,7 +169,8 @@ def smith_predictor(inputs: Inputs) -> Statements:
         "statement.C_aw_is_C_s": float(np.allclose(C_aw / C_s, 1, atol=NOTHING)),
         "statement.N_p_at_zero": float(_is_one_over_s(a)),
         "statement.pole_at_zero": float(_tracking_needs_pole_at_zero(plant, a)),
-        "statement.robust": float(margins_of(loop, design.additive_bound).W_a_C_S.value < 1),
+        "statement.robust": float(margins.W_a_C_S.value < 1),
+        "statement.delay_destabilises": float(np.isfinite(margins.delay_greatest_s.value)),
         "statement.T_si": float(bool(np.allclose(e, 1 / e, rtol=1e-3))),
         "statement.T_so_3_21": float(_W_follows_at_all_s(T_so, design.reference_omegas[0])),
         "statement.Z_aw_polynomial": float(_grows_as_a_polynomial(T_so, plant.delay_s)),

@@ -38,6 +38,15 @@ def test_the_sections_stand_in_their_order_with_their_counts(page: str, judged: 
     )
 
 
+def test_the_readme_gives_the_same_counts(judged: pd.DataFrame):
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    for verdict, words in {"agrees": "agree", "differs": "differ", "not_reproducible": "cannot be reproduced"}.items():
+        counts = judged["printed"][judged["verdict"] == verdict].eq("true").value_counts()
+        assert re.search(rf"^\| {words}.* \| {counts[False]} \| {counts[True]} \|$", readme, flags=re.MULTILINE), (
+            verdict
+        )
+
+
 def test_every_row_stands_once(page: str, judged: pd.DataFrame):
     ids = re.findall(r"^\| `([^`]+)` \|", page, flags=re.MULTILINE)
     assert sorted(ids) == sorted(judged["id"])

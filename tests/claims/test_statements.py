@@ -13,6 +13,7 @@ from design.block import Block, plant_block, plant_denominator
 from design.contract import Design
 from design.extended import design_extended
 from design.mixed_sensitivity import mixed_sensitivity
+from design.quasi_polynomial import DelayLoop, rightmost_roots, roots_right_of
 from design.robustness import delay_loop, margins_of
 from design.stable_interpolation import by_zeros, conditions
 from experiments import claims_runs
@@ -51,6 +52,18 @@ def test_the_wound_up_control_settles_inside_the_range(pid_runs: pd.DataFrame):
     assert half > 10 * values["limit"]
 
 
+def test_the_printed_pid_gains_do_not_stabilise_and_the_swapped_ones_do():
+    """By the exact characteristic roots, and by the argument principle."""
+    values = printed()["pid"]
+    lag = 1 / values["time_constant_s"]
+    plant = Block(values["gain"] * lag, (), (complex(-lag),), values["delay_s"])
+    gains = values["printed_proportional"], values["printed_integral"]
+    for (proportional, integral), real, right in ((gains, 0.108, 2), (gains[::-1], -0.117, 0)):
+        loop = DelayLoop(plant, Block(proportional, (complex(-integral / proportional),), (0j,)), Block(0.0), 0.0)
+        assert rightmost_roots(loop, 1).roots[0].real == pytest.approx(real, abs=0.0005)
+        assert roots_right_of(loop, 0.0) == right
+
+
 def test_u_and_sat_u_coincide_only_later(pid_runs: pd.DataFrame):
     control, saturated = (pid_runs[f"{name}_swapped_back_calculation"] for name in ("control", "saturated"))
     apart = pid_runs["time_s"][control != saturated]
@@ -74,6 +87,28 @@ def test_the_controller_of_chapter_2_hides_the_integrator(delay_free_design: Des
 
     slope = from_input_disturbance(1e-7) / from_input_disturbance(1e-6)
     assert slope == pytest.approx(10, rel=1e-3)
+
+
+def test_one_over_one_plus_F_has_the_poles_of_the_reference(delay_free_design: Design):
+    """A/Lambda is improper too: deg A = 5, deg Lambda = 4."""
+    plant, Lambda = delay_free_design.plant.without_delay(), delay_free_design.blocks["Lambda"]
+    inverse = plant_denominator(plant) * Lambda.inverse()
+    assert delay_free_design.reference_omegas[0] * 1j in inverse.poles
+    assert inverse.relative_degree == -1
+    assert not inverse.is_stable
+    assert 0j in delay_free_design.blocks["theta1"].poles
+
+
+def test_the_loop_of_chapter_2_tolerates_the_dead_time_with_our_weights(delay_free_design: Design):
+    """Up to the dead time that the delay margin of the loop without one says, the hidden integrator apart."""
+    bound = delay_free_design.additive_bound
+    greatest = margins_of(delay_loop(delay_free_design, delay_free_design.loop_plant), bound).delay_greatest_s.value
+    assert greatest == pytest.approx(0.0248, abs=0.0001)
+    assert greatest > 3 * delay_free_design.plant.delay_s
+    for delay_s, right in ((0.99 * greatest, 0), (1.01 * greatest, 2)):
+        loop = delay_loop(delay_free_design, replace(delay_free_design.plant, delay_s=delay_s))
+        assert loop.hidden.count(0j) == 1
+        assert roots_right_of(loop, 1e-6) == right
 
 
 def test_the_final_value_step_says_of_a_loop_without_internal_model_that_it_tracks():

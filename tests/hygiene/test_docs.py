@@ -38,7 +38,7 @@ def test_the_errata_explain_every_claim_that_does_not_agree() -> None:
     explained: list[str] = []
     for entry in entries:
         text, _, rows = entry.partition("- *Rows:*")
-        names = re.findall(r"`([\w.]+)`", rows.partition("\n\n")[0])
+        names = re.findall(r"`([\w.#]+)`", rows.partition("\n\n")[0])
         assert names, entry.splitlines()[0]
         evidence = set(re.findall(r"`(tests/[\w/]+\.py::\w+)`", text))
         assert not [name for name in names if not evidence & set(ledger.loc[name, "evidence"].split())]
