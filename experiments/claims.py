@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -11,12 +12,15 @@ import pandas as pd
 
 from experiments.claims_inputs import Inputs, rounded_inputs
 from experiments.printed_number import PrintedNumber, read_number
-from identification.files import InputError, read_text
+from experiments.tables import read_cells
+from identification.files import InputError
 from identification.thesis import DATA
 
 LEDGER = DATA / "thesis" / "claims.csv"
 COLUMNS = ("id", "where", "quote", "printed", "unit", "kind", "compute", "status", "reason", "evidence")
 SLACK = 1e-9  # relative; 175^2 = 30625 lies half-way between the printed 3.062e4 and 3.063e4
+
+FUNCTION = r"experiments\.\w+:[a-zA-Z]\w*"
 
 Compute = Callable[[Inputs], Mapping[str, float]]
 
@@ -27,12 +31,18 @@ def read_ledger(path: Path = LEDGER) -> pd.DataFrame:
     Raises
     ------
     InputError
-        The file is missing or has other columns.
+        The file is no such table, see :func:`experiments.tables.read_cells`, an id stands twice, or ``compute`` does
+        not name a function of this room.
     """
-    read_text(path)
-    ledger = pd.read_csv(path, dtype=str, keep_default_na=False)
-    if tuple(ledger.columns) != COLUMNS:
-        raise InputError(f"{path}: the columns are {', '.join(ledger.columns)}; expected {', '.join(COLUMNS)}")
+    ledger = read_cells(path, COLUMNS)
+    twice = ledger["id"][ledger["id"].duplicated()]
+    if len(twice):
+        raise InputError(f"{path}: the id {twice.iloc[0]} stands twice; expected every id once")
+    for name, compute in ledger[["id", "compute"]].itertuples(index=False):
+        if compute and not re.fullmatch(FUNCTION, compute):
+            raise InputError(
+                f"{path}: compute of {name} is '{compute}'; expected experiments.module:function or nothing"
+            )
     return ledger
 
 
@@ -58,7 +68,8 @@ def recompute(ledger: pd.DataFrame) -> pd.DataFrame:
     -----
     tolerance = half_unit + SLACK |printed|, and, only where computed - printed exceeds that, the propagated rounding
     of the inputs. This is linear: each rounded input that the function reads is moved by plus and minus half a
-    unit of its own last digit, and the larger changes are summed. A statement, which has no digits, gets no tolerance.
+    unit of its own last digit, and the larger changes are summed. A statement, which has no digits, gets no tolerance;
+    nor do runs and designs move with the inputs, which take the set ``implied`` as it stands.
 
     Raises
     ------

@@ -21,18 +21,20 @@ PAGE = click.Path(path_type=Path, dir_okay=False)
 @click.option("--page", type=PAGE, help="Markdown file to write the page to.")
 def claims_command(output: Path, page: Path | None) -> None:
     """What the thesis claims, computed again: claims.csv, and a page to read."""
-    from experiments.claims import read_ledger, recompute
-    from experiments.claims_coverage import read_record
+    from experiments.claims import LEDGER, read_ledger, recompute
+    from experiments.claims_coverage import EXCEPTIONS, RECORD, quotes_sha256, read_exceptions, read_record
     from experiments.claims_page import claims_page
 
     if not output.is_dir():
         raise InputError(f"{output}: no such folder")
-    table = recompute(read_ledger())
+    ledger, record = read_ledger(), read_record()
+    counted = record["ledger_sha256"] == quotes_sha256(ledger, read_exceptions())
+    table = recompute(ledger)
     path = output / "claims.csv"
     writers: dict[Path, Callable[[Path], object]] = {path: csv_writer(table)}
     if page:
-        writers[page] = _text_writer(claims_page(table, read_record()))
-    write_whole(writers)
+        writers[page] = _text_writer(claims_page(table, record, counted))
+    write_whole(writers, [LEDGER, RECORD, EXCEPTIONS])
     click.echo(f"{len(table)} claims -> {path}")
     for verdict, count in table["verdict"].value_counts().items():
         click.echo(f"  {verdict:17s}{count:4d}")
@@ -45,14 +47,21 @@ def claims_command(output: Path, page: Path | None) -> None:
 @click.option("--record", type=PAGE, help="JSON file to keep the counts in.")
 def coverage_command(text: Path, record: Path | None) -> None:
     """List the numbers in the thesis's TEXT that no claim quotes; exit status 1 if there is one, or a quote is not."""
-    from experiments.claims import read_ledger
-    from experiments.claims_coverage import LEFT, coverage, coverage_record, quotes_missing_from, read_exceptions
+    from experiments.claims import LEDGER, read_ledger
+    from experiments.claims_coverage import (
+        EXCEPTIONS,
+        LEFT,
+        coverage,
+        coverage_record,
+        quotes_missing_from,
+        read_exceptions,
+    )
 
     content, ledger, exceptions = read_text(text), read_ledger(), read_exceptions()
     covered = coverage(content, ledger, exceptions)
     counts = coverage_record(content, covered, ledger, exceptions)
     if record:
-        write_whole({record: _text_writer(json.dumps(counts, indent=2) + "\n")}, [text])
+        write_whole({record: _text_writer(json.dumps(counts, indent=2) + "\n")}, [text, LEDGER, EXCEPTIONS])
     click.echo(f"{text}: {counts['numbers']} numbers")
     for status, count in counts["statuses"].items():
         click.echo(f"  {status:17s}{count:4d}")
@@ -69,10 +78,10 @@ def coverage_command(text: Path, record: Path | None) -> None:
 @click.option("--page", type=PAGE, required=True, help="Markdown file to write the page to.")
 def equations_command(page: Path) -> None:
     """Each equation, lemma, theorem, table and figure of the thesis with its function and its test, as a page."""
-    from experiments.equations_page import equations_page, read_equations
+    from experiments.equations_page import EQUATIONS, equations_page, read_equations
 
     table = read_equations()
-    write_whole({page: _text_writer(equations_page(table))})
+    write_whole({page: _text_writer(equations_page(table))}, [EQUATIONS])
     click.echo(f"{len(table)} labels -> {page}")
 
 

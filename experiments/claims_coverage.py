@@ -13,18 +13,20 @@ from typing import Any
 import pandas as pd
 
 from experiments.printed_number import patterns
+from experiments.tables import read_cells
 from identification.files import InputError, read_text
 from identification.thesis import DATA
 
 EXCEPTIONS = DATA / "thesis" / "exceptions.csv"
 RECORD = DATA / "thesis" / "coverage.json"
 EXCEPTION_COLUMNS = ("name", "scope", "pattern", "why")
+RECORDED = ("text_sha256", "ledger_sha256", "numbers", "statuses")
 SCOPES = ("text", "formula")
 LEFT, QUOTED = "left", "quoted"
 CONTEXT = 30  # characters on either side of a number
 
 NUMBER = re.compile(r"\d+(?:\.\d+)*")
-FORMULA = re.compile(r"\$\$.*?\$\$|\$[^$]*\$", re.DOTALL)
+FORMULA = re.compile(r"\$\$.*?\$\$|\$(?:(?!\n\s*\n)[^$])*\$", re.DOTALL)  # a formula ends with its paragraph
 
 
 def read_exceptions(path: Path = EXCEPTIONS) -> pd.DataFrame:
@@ -39,21 +41,18 @@ def read_exceptions(path: Path = EXCEPTIONS) -> pd.DataFrame:
     Raises
     ------
     InputError
-        The file is missing, has other columns, another scope, or a pattern that is none.
+        The file is no such table, has another scope, a pattern that is none, or a name with another meaning.
     """
-    read_text(path)
-    exceptions = pd.read_csv(path, dtype=str, keep_default_na=False)
-    if tuple(exceptions.columns) != EXCEPTION_COLUMNS:
-        raise InputError(
-            f"{path}: the columns are {', '.join(exceptions.columns)}; expected {', '.join(EXCEPTION_COLUMNS)}"
-        )
-    for line, row in enumerate(exceptions.itertuples(), start=2):
-        if row.scope not in SCOPES:
-            raise InputError(f"{path}, line {line}: scope is {row.scope!r}; expected {' or '.join(SCOPES)}")
+    exceptions = read_cells(path, EXCEPTION_COLUMNS)
+    for line, (name, scope, pattern, _) in enumerate(exceptions.itertuples(index=False, name=None), start=2):
+        if name in (LEFT, QUOTED):
+            raise InputError(f"{path}, line {line}: an exception is named {name}; expected another name")
+        if scope not in SCOPES:
+            raise InputError(f"{path}, line {line}: scope is {scope!r}; expected {' or '.join(SCOPES)}")
         try:
-            re.compile(str(row.pattern))
+            re.compile(pattern)
         except re.error as error:
-            raise InputError(f"{path}, line {line}: {row.pattern!r} is no regular expression ({error})") from None
+            raise InputError(f"{path}, line {line}: {pattern!r} is no regular expression ({error})") from None
     return exceptions
 
 
@@ -134,12 +133,14 @@ def read_record(path: Path = RECORD) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The file is missing or is no JSON.
+        The file is missing, is no JSON, or is not what that function returns.
     """
     try:
-        content: dict[str, Any] = json.loads(read_text(path))
+        content = json.loads(read_text(path))
     except json.JSONDecodeError as error:
         raise InputError(f"{path}, line {error.lineno}: {error.msg}; expected JSON") from None
+    if not isinstance(content, dict) or list(content) != list(RECORDED):
+        raise InputError(f"{path}: expected an object with {', '.join(RECORDED)}")
     return content
 
 

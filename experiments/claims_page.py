@@ -27,7 +27,11 @@ inputs is propagated where that is exceeded. A statement is printed as *true*. I
 measured: they are compared with what this project uses, and count as transcribed, never as reproduced."""
 
 
-def claims_page(judged: pd.DataFrame, record: Mapping[str, Any]) -> str:
+NOT_COUNTED = """The ledger's quotes or the exceptions have changed since the numbers of the thesis's text were counted:
+`python -m experiments coverage TEXT --record data/thesis/coverage.json` counts again."""
+
+
+def claims_page(judged: pd.DataFrame, record: Mapping[str, Any], counted: bool) -> str:
     """The page as Markdown.
 
     Parameters
@@ -36,6 +40,8 @@ def claims_page(judged: pd.DataFrame, record: Mapping[str, Any]) -> str:
         As :func:`experiments.claims.recompute` returns it.
     record
         As :func:`experiments.claims_coverage.coverage_record` returns it.
+    counted
+        Whether that is for the quotes and exceptions as they are now.
 
     Raises
     ------
@@ -45,7 +51,7 @@ def claims_page(judged: pd.DataFrame, record: Mapping[str, Any]) -> str:
     unknown = set(judged["verdict"]) - set(TITLES)
     if unknown:
         raise InputError(f"the ledger has the verdict {', '.join(sorted(unknown))}; expected {', '.join(TITLES)}")
-    parts = [HEAD, _counts(judged), _covered(record)]
+    parts = [HEAD, _counts(judged), _covered(record) if counted else NOT_COUNTED]
     for verdict, title in TITLES.items():
         rows = judged[judged["verdict"] == verdict]
         body = _with_reasons(rows) if verdict not in ("agrees", "input") else _by_quote(rows)

@@ -11,7 +11,8 @@ from typing import Any
 
 import pandas as pd
 
-from identification.files import InputError, read_text
+from experiments.tables import read_cells
+from identification.files import InputError
 from identification.thesis import DATA
 
 EQUATIONS = DATA / "thesis" / "equations.csv"
@@ -50,13 +51,10 @@ def read_equations(path: Path = EQUATIONS) -> pd.DataFrame:
     Raises
     ------
     InputError
-        The file is missing or has other columns, a label stands twice, or a cell but the remark is empty or not of its
-        form.
+        The file is no such table, see :func:`experiments.tables.read_cells`, a label stands twice, or a cell but the
+        remark is empty or not of its form.
     """
-    read_text(path)
-    table = pd.read_csv(path, dtype=str, keep_default_na=False)
-    if tuple(table.columns) != COLUMNS:
-        raise InputError(f"{path}: the columns are {', '.join(table.columns)}; expected {', '.join(COLUMNS)}")
+    table = read_cells(path, COLUMNS)
     for line, row in enumerate(table.to_dict("records"), start=1):
         for column, form in FORMS.items():
             if not re.fullmatch(form, row[column]):

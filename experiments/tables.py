@@ -1,18 +1,45 @@
-"""Tables -> CSV files, all of them or none."""
+"""Tables -> CSV files, all of them or none; a CSV file of text -> a table."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import csv
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from io import StringIO
 from pathlib import Path
 
 import pandas as pd
 
-from identification.files import write_whole
+from identification.files import InputError, read_text, write_whole
 
 
 def write_tables(tables: Mapping[Path, pd.DataFrame], inputs: Iterable[Path] = ()) -> None:
     """Write tables as CSV, all of them or none, see :func:`csv_writer`."""
     write_whole({path: csv_writer(table) for path, table in tables.items()}, inputs)
+
+
+def read_cells(path: Path, columns: Sequence[str]) -> pd.DataFrame:
+    """Read a CSV file whose columns are known; every cell is text as it stands there.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, has other columns or no rows, or a row has more or fewer cells.
+    """
+    reader = csv.reader(StringIO(read_text(path), newline=""), strict=True)
+    rows: list[list[str]] = []
+    try:
+        for row in reader:
+            if rows and len(row) != len(columns):
+                raise InputError(f"{path}, line {reader.line_num}: {len(row)} cells; expected {len(columns)}")
+            rows.append(row)
+    except csv.Error as error:
+        raise InputError(f"{path}, line {reader.line_num}: {error}; expected comma-separated values") from None
+    header = rows[0] if rows else []
+    if header != list(columns):
+        raise InputError(f"{path}: the columns are {', '.join(header) or 'none'}; expected {', '.join(columns)}")
+    if len(rows) == 1:
+        raise InputError(f"{path}: no rows below the names of the columns")
+    return pd.DataFrame(rows[1:], columns=list(columns), dtype=str)
 
 
 def csv_writer(table: pd.DataFrame) -> Callable[[Path], object]:

@@ -96,9 +96,11 @@ def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterab
     Raises
     ------
     InputError
-        A target is one of the inputs, exists and is no regular file, or may not be written.
+        A target is one of the inputs, is named twice, exists and is no regular file, or may not be written.
     """
     read = {path.resolve() for path in inputs}
+    if len({path.resolve() for path in writers}) < len(writers):
+        raise InputError(f"{', '.join(map(str, writers))}: two of these are one file; expected different files")
     for path in writers:
         if path.resolve() in read:
             raise InputError(f"{path}: is an input too; expected another file to write")

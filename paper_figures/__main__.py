@@ -5,6 +5,7 @@ from __future__ import annotations
 import pkgutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from importlib import import_module
 from io import StringIO
 from pathlib import Path
@@ -116,13 +117,14 @@ def report_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
 
     designs = read_attempts({name: build / f"design_{name}" for name in FOLLOWING}, ".json", read_design)
     experiments = [name for names in FOLLOWING.values() for name in names]
-    outcomes = read_attempts({name: build / "results" / name for name in experiments}, "_summary.csv", read_table)
+    stems = {name: build / "results" / name for name in experiments}
+    outcomes = read_attempts(stems, "_summary.csv", partial(read_table, figure="report"))
     figures = {name: figure_module(name).TABLES for name in figure_names()}
     inputs = read_inputs(model, sweeps, build, figures, designs, outcomes)
     tables = {f"{name}_summary": table for name, table in outcomes.items() if isinstance(table, pd.DataFrame)}
     with missing_columns_named(tables, build / "results", "report"):
         content = report_content(inputs)
-    click.echo(f"{len(content.rows)} claims, {len(figures)} figures -> {write_report(content, build)}")
+    click.echo(f"{len(content.rows)} claims, {len(figures)} figures -> {write_report(content, build, inputs.files)}")
 
 
 def figure_names() -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import re
 from base64 import b64encode
+from collections.abc import Iterable
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -41,8 +42,8 @@ def report_html(content: Content) -> str:
     )
 
 
-def write_report(content: Content, build: Path) -> Path:
-    """Write the page to BUILD/report/index.html and return its path.
+def write_report(content: Content, build: Path, inputs: Iterable[Path]) -> Path:
+    """Write the page to BUILD/report/index.html, which must not be one of the inputs, and return its path.
 
     Raises
     ------
@@ -55,7 +56,7 @@ def write_report(content: Content, build: Path) -> Path:
         path.parent.mkdir(exist_ok=True)
     except OSError as error:
         raise InputError(f"{path.parent}: cannot be made ({error.strerror})") from None
-    write_whole({path: lambda partial: partial.write_text(page, encoding="utf-8", newline="\n")})
+    write_whole({path: lambda partial: partial.write_text(page, encoding="utf-8", newline="\n")}, inputs)
     return path
 
 

@@ -16,6 +16,7 @@ from identification.discretised import alias_free
 from identification.files import InputError, read_bytes
 from identification.frequency_response import FrequencyResponse, input_files, read_sweeps
 from identification.model import IdentifiedModel, read_model
+from identification.plant import PlantModel
 from identification.thesis import DATA
 from paper_figures.summary_of_designs import FOLLOWING
 
@@ -23,6 +24,9 @@ Kind = TypeVar("Kind")
 
 LEDGER = ("id", "where", "quote", "printed", "computed", "unit", "tolerance", "verdict", "reason", "evidence", "kind")
 """The columns of the ledger that the report shows, in its order."""
+
+KINDS = {"delay_free": "delay-free", "extended": "extended", "robust": "extended"}
+"""The kind of each of the designs."""
 
 SOURCES = ("data/thesis/thesis.toml", "data/thesis/claims.csv", "requirements.lock")
 """Files of the project that everything rests on; those that an installation lacks are left out."""
@@ -60,6 +64,8 @@ class Inputs:
         Name -> text of each of them, and of the ledger as ``claims``.
     hashes
         Name and SHA-256 of every file that was read, the pictures apart.
+    files
+        The paths of all that was read.
     """
 
     model_name: str
@@ -72,6 +78,7 @@ class Inputs:
     figure_tables: Mapping[str, tuple[str, ...]]
     tables: Mapping[str, str]
     hashes: tuple[tuple[str, str], ...]
+    files: tuple[Path, ...]
 
 
 def read_inputs(
@@ -100,12 +107,14 @@ def read_inputs(
     Raises
     ------
     InputError
-        A file is missing that no refusal accounts for, or is not what it should be.
+        A file is missing that no refusal accounts for, is not what it should be, or is of another model.
     """
     hashes: list[tuple[str, str]] = []
+    files: list[Path] = [*input_files(sweeps)]
 
     def read(path: Path, name: str) -> str:
         content = read_bytes(path)
+        files.append(path)
         hashes.append((name, sha256(content).hexdigest()))
         return _decoded(content, path)
 
@@ -115,7 +124,7 @@ def read_inputs(
     designs, outcomes = without_path(designs), without_path(outcomes)
     identified = read_model(model)
     tests = [alias_free(test, identified.plant) for test in read_sweeps(sweeps)]
-    hashes += [(path.name, sha256(read_bytes(path)).hexdigest()) for path in input_files(sweeps)]
+    hashes += [(path.name, sha256(read_bytes(path)).hexdigest()) for path in files]
     for source in SOURCES:
         if (path := DATA.parent / source).is_file():
             read(path, source)
@@ -125,7 +134,8 @@ def read_inputs(
         path = build / f"design_{name}.json"
         if name not in designs:
             raise InputError(f"{path}: no such file; expected a design, or the sentence that refused it")
-        if isinstance(designs[name], Design):
+        if isinstance(design := designs[name], Design):
+            _require_of_model(path, design, KINDS[name], identified.plant)
             read(path, path.name)
     pictures = {name: _picture(build, name, tables, designs, outcomes) for name, tables in figures.items()}
     paths = {table: build / "results" / f"{table}.csv" for tables in figures.values() for table in tables}
@@ -135,6 +145,9 @@ def read_inputs(
     }
     wanted = dict.fromkeys(table for tables in held.values() for table in tables)
     texts = {table: read(paths[table], f"results/{table}.csv") for table in wanted}
+    for table, text in texts.items():
+        if len(text.splitlines()) < 2:
+            raise InputError(f"{paths[table]}: no rows below the names of the columns")
     texts["claims"] = read(build / "claims.csv", "claims.csv")
     ledger = _ledger(texts["claims"], build / "claims.csv")
     return Inputs(
@@ -148,7 +161,16 @@ def read_inputs(
         held,
         texts,
         tuple(hashes),
+        (*files, *(build / "figures" / f"{name}.{kind}" for name in figures for kind in ("svg", "txt"))),
     )
+
+
+def _require_of_model(path: Path, design: Design, kind: str, plant: PlantModel) -> None:
+    if design.kind != kind:
+        raise InputError(f"{path}: kind is '{design.kind}'; expected '{kind}'")
+    if design.plant != plant:
+        gains = f"{design.plant.gain:g}; expected one for the model, whose gain is {plant.gain:g}"
+        raise InputError(f"{path}: is for a plant of gain {gains}")
 
 
 def experiment_of(table: str) -> str:
@@ -167,7 +189,10 @@ def _picture(
     """A drawn figure, or the sentence that refused what it would show."""
     svg, caption = (build / "figures" / f"{name}.{kind}" for kind in ("svg", "txt"))
     if svg.is_file() and caption.is_file():
-        return Picture(read_bytes(svg), _decoded(read_bytes(caption), caption).strip())
+        picture = read_bytes(svg)
+        if b"<svg" not in picture:
+            raise InputError(f"{svg}: no SVG picture; expected what 'python -m paper_figures draw {name}' writes")
+        return Picture(picture, _decoded(read_bytes(caption), caption).strip())
     for experiment in map(experiment_of, tables):
         needed = [designs[design] for design, names in FOLLOWING.items() if experiment in names]
         for outcome in (outcomes.get(experiment), *needed):

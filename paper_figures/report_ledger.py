@@ -80,15 +80,24 @@ def chapter_of(where: str) -> str:
 
 
 def colour(verdict: str) -> str:
-    """The colour of a verdict; grey of one that is not known."""
-    return str(LINES[VERDICTS[verdict][0] if verdict in VERDICTS else "family 4"]["color"])
+    """The colour of one of :data:`VERDICTS`."""
+    return str(LINES[VERDICTS[verdict][0]]["color"])
 
 
 def verdicts(ledger: pd.DataFrame) -> Iterator[Verdict]:
-    """Each verdict of the ledger with its count; those that are known first."""
+    """Each verdict of the ledger with its count.
+
+    Raises
+    ------
+    InputError
+        A verdict is not one of :data:`VERDICTS`.
+    """
     counts = ledger["verdict"].value_counts()
-    for name in sorted(counts.index, key=lambda name: ([*VERDICTS, name].index(name), name)):
-        yield Verdict(name, int(counts[name]), VERDICTS.get(name, ("", ""))[1], colour(name))
+    if unknown := set(counts.index) - set(VERDICTS):
+        raise InputError(f"the ledger has the verdict {', '.join(sorted(unknown))}; expected {', '.join(VERDICTS)}")
+    for name, (_, meaning) in VERDICTS.items():
+        if name in counts:
+            yield Verdict(name, int(counts[name]), meaning, colour(name))
 
 
 def differences(ledger: pd.DataFrame) -> Iterator[Difference]:

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture(scope="module")
 def page(judged: pd.DataFrame) -> str:
-    return claims_page(judged, read_record())
+    return claims_page(judged, read_record(), True)
 
 
 def test_the_page_in_the_repository_is_current(page: str):
@@ -64,4 +64,10 @@ def test_what_differs_stands_with_reason_and_links_to_its_evidence(page: str, ju
 
 def test_a_verdict_without_a_section_is_refused(judged: pd.DataFrame):
     with pytest.raises(InputError, match="has the verdict perhaps"):
-        claims_page(judged.assign(verdict="perhaps"), read_record())
+        claims_page(judged.assign(verdict="perhaps"), read_record(), True)
+
+
+def test_a_count_of_other_quotes_is_not_given(judged: pd.DataFrame):
+    page = claims_page(judged, read_record(), False)
+    assert "have changed since" in page
+    assert "are quoted by a row" not in page

@@ -140,6 +140,7 @@ def test_the_record_of_a_text(exceptions: pd.DataFrame):
         ("name,pattern\n", "the columns are name, pattern"),
         (",".join(EXCEPTION_COLUMNS) + "\na,line,x,y\n", "line 2: scope is 'line'"),
         (",".join(EXCEPTION_COLUMNS) + "\na,text,(,y\n", "line 2: '(' is no regular expression"),
+        (",".join(EXCEPTION_COLUMNS) + "\nquoted,text,x,y\n", "line 2: an exception is named quoted"),
     ],
 )
 def test_bad_exceptions_are_refused(content: str, part: str, tmp_path: Path):
@@ -150,10 +151,13 @@ def test_bad_exceptions_are_refused(content: str, part: str, tmp_path: Path):
     assert part in str(refused.value)
 
 
-def test_bad_records_are_refused(tmp_path: Path):
+@pytest.mark.parametrize(
+    ("content", "part"), [("{", "line 1: "), ("[]", "expected an object"), ("{}", "with text_sha")]
+)
+def test_bad_records_are_refused(content: str, part: str, tmp_path: Path):
     path = tmp_path / "coverage.json"
-    path.write_text("{", encoding="utf-8")
-    with pytest.raises(InputError, match=r"line 1: .*; expected JSON"):
+    path.write_text(content, encoding="utf-8")
+    with pytest.raises(InputError, match=part):
         read_record(path)
 
 

@@ -8,8 +8,9 @@ import pytest
 from click.testing import CliRunner
 
 from experiments.__main__ import main
-from experiments.claims import COLUMNS, read_ledger, recompute
+from experiments.claims import COLUMNS, LEDGER, read_ledger, recompute
 from experiments.claims_inputs import Inputs, rounded_inputs
+from experiments.equations_page import EQUATIONS
 from experiments.printed_number import PrintedNumber, read_number
 from identification.files import InputError
 
@@ -126,6 +127,55 @@ def test_ledger_with_other_columns_is_refused(tmp_path: Path):
         read_ledger(path)
     with pytest.raises(InputError, match="no such file"):
         read_ledger(tmp_path / "absent.csv")
+
+
+@pytest.mark.parametrize(
+    ("lines", "part"),
+    [
+        ([""], "the columns are none"),
+        ([",".join(COLUMNS)], "no rows below"),
+        ([",".join(COLUMNS), "a,b"], "line 2: 2 cells; expected 10"),
+        ([",".join(COLUMNS), 'a,"b'], "line 2: unexpected end of data"),
+        ([",".join(COLUMNS), "a,,,1,,,,,,", "a,,,1,,,,,,"], "the id a stands twice"),
+        (
+            [",".join(COLUMNS), "a,,,1,,,os:getcwd,,,"],
+            "compute of a is 'os:getcwd'; expected experiments.module:function",
+        ),
+    ],
+)
+def test_ledgers_that_are_none_are_refused(lines: list[str], part: str, tmp_path: Path):
+    path = tmp_path / "claims.csv"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        read_ledger(path)
+    assert part in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "target"),
+    [("coverage", "--record", LEDGER), ("claims", "--page", LEDGER), ("equations", "--page", EQUATIONS)],
+)
+def test_no_command_writes_over_what_it_reads(command: str, option: str, target: Path, tmp_path: Path):
+    before = target.read_bytes()
+    text = tmp_path / "text.md"
+    text.write_text("7.5\n", encoding="utf-8")
+    arguments = {"coverage": [str(text)], "claims": ["--output", str(tmp_path)], "equations": []}[command]
+    link = tmp_path / "link"
+    link.symlink_to(target)
+    for path in (target, link):
+        result = CliRunner().invoke(main, [command, *arguments, option, str(path)])
+        assert result.exit_code == 2
+        assert "is an input too" in result.output
+    assert target.read_bytes() == before
+    assert {path.name for path in tmp_path.iterdir()} == {"text.md", "link"}
+
+
+def test_two_outputs_of_one_path_are_refused(small_ledger: Path):
+    path = small_ledger / ".." / small_ledger.name / "claims.csv"
+    result = CliRunner().invoke(main, ["claims", "--output", str(small_ledger), "--page", str(path)])
+    assert result.exit_code == 2
+    assert "two of these are one file" in result.output
+    assert not list(small_ledger.iterdir())
 
 
 @pytest.fixture
