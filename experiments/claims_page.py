@@ -23,8 +23,13 @@ Every number that the thesis's text prints, and every statement of it that can b
 is not the one computed, in either direction.
 
 A number agrees when the computed one lies within half a unit of its last printed digit; the rounding of the printed
-inputs is propagated where that is exceeded. A statement is printed as *true*. Inputs are what the thesis chose or
-measured: they are compared with what this project uses, and count as transcribed, never as reproduced."""
+inputs is propagated where that is exceeded. A statement is printed as *true*; on formulas it is judged by evaluating
+both sides, on chapter 2's loop with our weights and with others, since the thesis prints none. Inputs are what the
+thesis chose or measured: they are compared with what this project uses, and count as transcribed, never as reproduced.
+
+The plant is the set `implied`, whose nine parameters are read off the printed theta_2. That the same nine give back
+theta_1, K_1, both G_A, C_aw and (4.8) but for its 285 is what the agreement of these says; that of theta_2 says
+nothing. C_0, F, K_0 and Table 4.2 follow from a, e, f, omega and T_d alone."""
 
 
 NOT_COUNTED = """The ledger's quotes or the exceptions have changed since the numbers of the thesis's text were counted:

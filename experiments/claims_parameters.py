@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from design.printed_optimum import beta_grid
 from design.stable_interpolation import by_zeros, conditions
 from experiments.claims_inputs import Inputs, plant_of
 from experiments.f_gamma import f_gamma_tables
@@ -48,12 +47,6 @@ def anti_windup(inputs: Inputs) -> dict[str, float]:
         "anti_windup.gamma": float(found["gamma"]),
         "anti_windup.beta_continuous": float(found["beta_best"]),
     }
-
-
-def beta_range(inputs: Inputs) -> dict[str, float]:
-    """Of the values of beta (s) that Fig. 2.10 compares, the one farthest from the middle of the printed range."""
-    grid = beta_grid(printed()["delay_free"]["alpha"])
-    return {"anti_windup.beta_range": max(grid, key=lambda beta: abs(beta - 0.5))}
 
 
 def measured(inputs: Inputs) -> dict[str, float]:

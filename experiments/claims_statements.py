@@ -77,9 +77,11 @@ def internal_model_principle(inputs: Inputs) -> Statements:
     The final value theorem, taken for a sinusoid as the proof takes it, says of 1/s under unit feedback, which has no
     internal model, that the error vanishes; its amplitude is |S(j omega)|.
     """
-    blocks, (omega,) = chapter_2().blocks, chapter_2().reference_omegas
+    design = chapter_2()
+    blocks, (omega,) = design.blocks, design.reference_omegas
+    found = rightmost_roots(delay_loop(design, design.loop_plant), 1)
     Lambda = blocks["Lambda"](1j * omega)
-    S = Lambda / (Lambda + blocks["K"](1j * omega) * plant_numerator(chapter_2().plant)(1j * omega))  # G_A = B/Lambda
+    S = Lambda / (Lambda + blocks["K"](1j * omega) * plant_numerator(design.plant)(1j * omega))  # G_A = B/Lambda
     proper = {
         factors: Block(1.0, blocks["G_A"].zeros, polynomial.zeros).relative_degree >= 0
         for factors, polynomial in {
@@ -91,7 +93,7 @@ def internal_model_principle(inputs: Inputs) -> Statements:
     limit = abs(s * s / (s + 1) * s / (s**2 + omega**2))  # s E(s) with S = s/(s + 1) and R = s/(s^2 + omega^2)
     amplitude = abs(1j * omega / (1j * omega + 1))
     return {
-        "statement.lemma_1": float(abs(S) < NOTHING),
+        "statement.lemma_1": float(bool(np.all(found.roots[~found.hidden].real < 0)) and abs(S) < NOTHING),
         "statement.epsilon_makes_proper": float(proper["with"] and not proper["without"]),
         "statement.final_value": float((limit < NOTHING) == (amplitude < NOTHING)),
         "statement.R": float(_is_the_reference(1.5 * omega, 2.5 * omega)),
@@ -144,6 +146,7 @@ def smith_predictor(inputs: Inputs) -> Statements:
     """Chapter 3: what is stable, what equals what, and what W_a guarantees, with the exact dead time."""
     design = chapter_4()
     plant, C_0, T_so, K = design.loop_plant, *(design.blocks[name] for name in ("C0", "T_so", "K"))
+    (omega,), W_aw = design.reference_omegas, T_so.scaled(-1.0) * Block(1.0, (0j,))
     loop = delay_loop(design, plant)
     found = rightmost_roots(loop, len(T_so.poles) + 1)
     roots = found.roots[~found.hidden]
@@ -161,7 +164,8 @@ def smith_predictor(inputs: Inputs) -> Statements:
         "statement.K_stabilises": float(_stabilises_augmented_plant(plant, K, T_so)),
         "statement.C0_stabilises": float(T_so.is_stable),
         "statement.C0_zeros": float(all(zero.real < 0 for zero in C_0.zeros)),
-        "statement.W_aw_stable": float(T_so.is_stable),
+        "statement.W_aw_stable": float(W_aw.is_stable and W_aw.relative_degree >= 0),
+        "statement.Z_aw_root": float(not _any_Z_aw_vanishes(omega, plant.delay_s)),
         "statement.choice_3_28": float(
             T_so.is_stable and np.allclose(1 / one_plus_PC, 1 - T_so(GRID) * e, atol=NOTHING)
         ),
@@ -172,7 +176,7 @@ def smith_predictor(inputs: Inputs) -> Statements:
         "statement.robust": float(margins.W_a_C_S.value < 1),
         "statement.delay_destabilises": float(np.isfinite(margins.delay_greatest_s.value)),
         "statement.T_si": float(bool(np.allclose(e, 1 / e, rtol=1e-3))),
-        "statement.T_so_3_21": float(_W_follows_at_all_s(T_so, design.reference_omegas[0])),
+        "statement.T_so_3_21": float(_W_follows_at_all_s(W_aw, omega)),
         "statement.Z_aw_polynomial": float(_grows_as_a_polynomial(T_so, plant.delay_s)),
         "bezout.Y": float(np.max(np.abs(Y))),
     }
@@ -184,14 +188,24 @@ def _grows_as_a_polynomial(T_so: Block, delay_s: float) -> bool:
     return bool(far < 2.0**100 * near)
 
 
-def _W_follows_at_all_s(T_so: Block, omega: float) -> bool:
-    """Whether every stable W_aw that meets (3.18) is -s T_so: that plus (s^2 + omega^2)/(s + omega)^2 meets it too."""
+def _W_follows_at_all_s(W_aw: Block, omega: float) -> bool:
+    """Whether every stable W_aw that meets (3.18) is -s T_so.
+
+    Tried is that plus s (s^2 + omega^2)/(s + omega)^3, which keeps what (3.18) and the zero at s = 0 ask for.
+    """
 
     def other(s: complex) -> complex:
-        return -s * complex(T_so(s)) + (s**2 + omega**2) / (s + omega) ** 2
+        return complex(W_aw(s)) + s * (s**2 + omega**2) / (s + omega) ** 3
 
-    at_omega, elsewhere = (abs(other(s) + s * complex(T_so(s))) for s in (1j * omega, 2j * omega))
-    return not (at_omega < NOTHING < elsewhere)
+    kept, apart = (abs(other(s) - complex(W_aw(s))) for s in (1j * omega, 2j * omega))
+    return not (kept < NOTHING < apart)
+
+
+def _any_Z_aw_vanishes(omega: float, delay_s: float) -> bool:
+    """Whether Z_aw = Lambda (W_aw exp(-T_d s) + s) vanishes at j omega for W_aw = 1, which does not meet (3.18)."""
+    s = 1j * omega
+    rest = np.exp(-delay_s * s) + s
+    return bool(abs((s**2 + omega**2) * rest) < NOTHING < abs(rest))
 
 
 def _same_roots(first: np.ndarray, second: np.ndarray) -> bool:

@@ -56,7 +56,7 @@ def test_every_number_gets_its_status(exceptions: pd.DataFrame):
         ("14", "citation"),
         ("1", "index"),
         ("2", "exponent"),
-        ("1", "constant"),
+        ("1", "one of a sum or fraction"),
         *[("4.5", "quoted"), ("10", "quoted"), ("3", "quoted")],  # one number: 4.5 x 10^-3
         ("7.8", "equation number"),
         *[("10", "quoted")] * 2,
@@ -73,13 +73,26 @@ def test_a_number_counts_only_inside_its_rows_quote(exceptions: pd.DataFrame):
     assert [status for _, status in statuses(text, ledger, exceptions)] == ["quoted", "quoted", "left", "left", "left"]
 
 
-def test_constants_are_exceptions_in_formulas_only(exceptions: pd.DataFrame):
-    assert statuses("from 0 to 1, $1 + s$, $3 + s$", QUOTES[:0], exceptions) == [
-        ("0", "left"),
-        ("1", "left"),
-        ("1", "constant"),
-        ("3", "left"),
-    ]
+@pytest.mark.parametrize(
+    ("text", "status"),
+    [
+        ("$1 + s$", "one of a sum or fraction"),
+        ("1 + s", "left"),
+        ("$3 + s$", "left"),
+        (r"$\lim_{s \rightarrow 0}$", "zero of a condition"),
+        (r"$2\zeta s$", "factor of two"),
+        ("$Q(s) = 1$", "equal to one"),
+        ("$F_1$", "index"),
+        ("$s^2$", "exponent"),
+        # what a claim may look like
+        *[(claim, "left") for claim in ("$2$ m", "$1 s$", "$K = 2$", "$n = 1$", r"$0 \%$", "from 0", "X_5", "$2 V$")],
+        (r"$2 \text{ m}$", "left"),
+        ("$s^7$", "left"),
+        ("a stray $ here\n\n1 + 1", "left"),
+    ],
+)
+def test_what_counts_as_an_exception(text: str, status: str, exceptions: pd.DataFrame):
+    assert {found for _, found in statuses(text, QUOTES[:0], exceptions)} == {status}
 
 
 def test_lines_and_contexts(exceptions: pd.DataFrame):

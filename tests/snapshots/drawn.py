@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -42,18 +43,38 @@ def drawn(figure: Figure) -> tuple[str, dict[str, np.ndarray]]:
         }
         for count, artist in enumerate(artists_of(axes)):
             listed, coordinates = _artist(artist)
-            lines.append(f"  {count} {type(artist).__name__} {listed} zorder {artist.get_zorder():.4g}")
+            lines.append(f"  {count} {type(artist).__name__} {listed} {_shown(artist)}")
             for name, values in coordinates.items():
                 numbers |= flagged(f"{place} {count} {name}", values)
     return "\n".join(lines) + "\n", {name: values for name, values in numbers.items() if len(values)}
+
+
+def _shown(artist: Artist) -> str:
+    """Where an artist lies in the stack, and what hides it, if anything does."""
+    hidden = "" if artist.get_visible() else " hidden"
+    return f"zorder {artist.get_zorder():.4g}{hidden}{_unless(artist.get_alpha(), None, ' alpha')}"
+
+
+def _unless(value: object, usual: object, name: str) -> str:
+    return "" if value == usual else f"{name} {value}"
 
 
 def _axes(place: int, axes: Axes) -> str:
     names = [axes.get_title(where) for where in ("left", "center", "right")]  # type: ignore[arg-type]
     return (
         f"axes {place} x {axes.get_xscale()} {axes.get_xlabel()!r} y {axes.get_yscale()} {axes.get_ylabel()!r}"
-        f"{'' if axes.axison else ' off'}{' titles ' + repr(names) if any(names) else ''}"
+        f"{'' if axes.axison else ' off'}{' titles ' + repr(names) if any(names) else ''} {_shown(axes)}"
+        f"{_unless(_ticks(axes), 'both', ' ticks')}"
     )
+
+
+def _ticks(axes: Axes) -> str:
+    """Which of the axes have ticks where they are seen."""
+    within = {
+        "x": any(axes.get_xlim()[0] <= at <= axes.get_xlim()[1] for at in axes.get_xticks()),
+        "y": any(min(axes.get_ylim()) <= at <= max(axes.get_ylim()) for at in axes.get_yticks()),
+    }
+    return "both" if all(within.values()) else " ".join(name for name, there in within.items() if there) or "none"
 
 
 def artists_of(axes: Axes) -> Iterator[Artist]:
@@ -70,16 +91,24 @@ def _artist(artist: Artist) -> tuple[str, dict[str, np.ndarray]]:
         x, y = (np.ma.filled(np.ma.asarray(values, dtype=float), np.nan) for values in artist.get_data(orig=False))
         _, dashes = artist._unscaled_dash_pattern  # type: ignore[attr-defined]
         look = f"{to_hex(artist.get_color())} {dashes or artist.get_linestyle()} {artist.get_linewidth():g}"
-        marker = "" if artist.get_marker() in ("None", None, "") else f" {artist.get_marker()}"
+        marker = ""
+        if artist.get_marker() not in ("None", None, ""):
+            faces = to_hex(artist.get_markerfacecolor()) if artist.get_markerfacecolor() != "none" else "hollow"
+            marker = f" {artist.get_marker()} {artist.get_markersize():g} {faces}"
+            marker += _unless(artist.get_markevery(), None, " every")
+        marker += _unless(artist.get_drawstyle(), "default", " drawn in")
         return f"{artist.get_label()!r} {look}{marker}: {len(x)} points", {"x": x, "y": y}
     if isinstance(artist, Legend):
-        return repr([text.get_text() for text in artist.get_texts()]), {}
+        handles = [f"{type(handle).__name__} {to_hex(_colour(handle))}" for handle in artist.legend_handles]
+        place = f"at {artist._loc} of {artist._ncols} columns"  # type: ignore[attr-defined]
+        return f"{[text.get_text() for text in artist.get_texts()]!r} {handles} {place}", {}
     if isinstance(artist, Text):
         x, y = (float(value) for value in artist.get_position())
         at = {"at": np.array([x, y])}
         if isinstance(artist, Annotation):
             at["of"] = np.array([float(value) for value in artist.xy])
-        look = f"{artist.get_fontsize():g} {artist.get_horizontalalignment()} {artist.get_verticalalignment()}"
+        look = f"{to_hex(artist.get_color())} {artist.get_fontsize():g}"
+        look += f" {artist.get_horizontalalignment()} {artist.get_verticalalignment()}"
         return f"{artist.get_text()!r} at {x:.3f} {y:.3f} {look} {artist.get_rotation():g}", at
     if isinstance(artist, QuadMesh):
         mesh = {"mesh": np.asarray(artist.get_coordinates()).ravel()}
@@ -95,3 +124,8 @@ def _artist(artist: Artist) -> tuple[str, dict[str, np.ndarray]]:
     look = f"{to_hex(artist.get_facecolor(), keep_alpha=True)} {to_hex(artist.get_edgecolor())}"
     look += f" {artist.get_linestyle()} {artist.get_linewidth():g}"
     return f"{artist.get_label()!r} {look}: {len(corners)} corners", {"corners": corners.ravel()}
+
+
+def _colour(handle: object) -> Any:
+    """The colour of a legend's handle: a line's own, a patch's face."""
+    return handle.get_color() if isinstance(handle, Line2D) else handle.get_facecolor()  # type: ignore[attr-defined]

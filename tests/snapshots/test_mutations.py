@@ -16,7 +16,7 @@ from matplotlib.collections import Collection, QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Polygon, Rectangle, StepPatch
+from matplotlib.patches import Circle, Patch, Polygon, Rectangle, StepPatch
 from matplotlib.text import Text
 from mutants import SMALL, is_caught, snapshot_files, stored_snapshot, tallied
 from pytest_regressions.common import check_text_files
@@ -113,7 +113,7 @@ def moved(artist: Artist) -> Iterator[Callable[[float], object]]:
 
 
 def test_every_change_of_a_drawing_is_caught(figure: tuple[Figure, Stored, str]) -> None:
-    """Each artist shifted by 1e-6 relative, taken away, each view shifted, each name changed."""
+    """Each artist shifted by 1e-6 relative, hidden, made pale, each view shifted, each name changed, one taken away."""
     drawing = figure[0]
     assert not is_noticed(figure)
     for axes in drawing.axes:
@@ -122,11 +122,22 @@ def test_every_change_of_a_drawing_is_caught(figure: tuple[Figure, Stored, str])
                 move(LARGER)
                 assert is_noticed(figure), f"{artist} shifted"
                 move(1.0)
+            artist.set_visible(False)
+            assert is_noticed(figure), f"{artist} hidden"
+            artist.set_visible(True)
+            if not isinstance(artist, Patch):  # whose faces and edges do not come back
+                alpha = artist.get_alpha()
+                artist.set_alpha(0.05)
+                assert is_noticed(figure), f"{artist} pale"
+                artist.set_alpha(alpha)
             assert not is_noticed(figure), f"{artist} restored"
         for ends, set_ends in ((axes.get_xlim(), axes.set_xlim), (axes.get_ylim(), axes.set_ylim)):
             set_ends(ends[0], ends[1] * LARGER)
             assert is_noticed(figure), f"{axes} with another view"
             set_ends(*ends)
+        axes.set_visible(False)
+        assert is_noticed(figure), f"{axes} hidden"
+        axes.set_visible(True)
         label = axes.get_ylabel()
         axes.set_ylabel(f"{label}.")
         assert is_noticed(figure), f"{axes} with another label"

@@ -35,6 +35,10 @@ def test_the_same_passes(stored: Path, strict_snapshot: Strict) -> None:
     strict_snapshot("good", GOOD)
 
 
+def test_the_tolerances_are_what_the_readme_says() -> None:
+    assert (RTOL, FLOOR) == (1e-8, 1e-12)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -43,6 +47,7 @@ def test_the_same_passes(stored: Path, strict_snapshot: Strict) -> None:
         (lambda c: {key: c[key] for key in ("y", "x", "count", "run")}, "columns changed"),
         (lambda c: c | {"x": 3 * c["x"]}, "differs"),  # far below num_regression's absolute tolerance
         (lambda c: c | {"y": c["y"] * (1 + 1e-6)}, "differs"),
+        (lambda c: c | {"y": c["y"] * (1 + 2 * RTOL)}, "differs"),
         (lambda c: c | {"y": c["y"] + np.array([1e-6, 0, 0, 0, 0])}, "differs, first in row 0"),
         (lambda c: c | {"y": np.append(c["y"], 6.0)}, "rows"),
         (lambda c: c | {"y": np.array([1.0, 2.0, np.nan, 4.0, 5.0])}, "not finite"),

@@ -1,0 +1,112 @@
+"""What the thesis states of chapter 2's loop, with our weights W_1 and W_2 and with others, since it prints none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from design.block import Block
+from design.contract import Design
+from design.mixed_sensitivity import mixed_sensitivity
+from design.quasi_polynomial import rightmost_roots
+from design.robustness import delay_loop
+from experiments.claims_inputs import Inputs
+from experiments.claims_statements import chapter_2
+from experiments.closed_loop import Run
+from experiments.loops import design_loop
+from experiments.scenarios import thesis_reference
+from experiments.tracking import run_all
+from identification.thesis import printed
+
+PERIODS = 50  # of the reference: what grows shows it by then
+GROWTH = 1.1  # from the first half of a run to the second
+DECAY_RATE = 0.1  # of the other weights, in 1/s
+
+
+def delay_free_runs(inputs: Inputs) -> dict[str, float]:
+    """Section 2.4 under the printed limits, from rest, see :func:`over_weights`.
+
+    Without anti-windup the loop becomes unstable: its control grows by more than a tenth from the first half of
+    :data:`PERIODS` periods to the second; the output cannot follow: the last period's error exceeds the amplitude.
+    With the thesis's the loop stays stable, by the same measure, and u is truncated at the limits, which it does not
+    exceed. And (section 3.2) the scheme cannot be applied with a dead time: the linear loop is unstable with that of
+    the plant.
+    """
+    chosen = printed()["delay_free"]
+    limit, amplitude = chosen["limit"], chosen["reference"]["amplitude"]
+
+    def cannot_follow(weights: str) -> bool:
+        error = long_run(weights, None).outputs["error"]
+        return bool(np.max(np.abs(error[-(len(error) // PERIODS) :])) > amplitude)
+
+    def unstable_with_dead_time(weights: str) -> bool:
+        design = DESIGNS[weights]()
+        found = rightmost_roots(delay_loop(design, design.plant), 1)
+        return bool(np.any(found.roots[~found.hidden].real >= 0))
+
+    return {
+        "statement.unstable_without": over_weights(lambda weights: grows(long_run(weights, None))),
+        "statement.cannot_follow": over_weights(cannot_follow),
+        "statement.stays_stable": over_weights(lambda weights: not grows(long_run(weights, "thesis"))),
+        "statement.truncated": over_weights(
+            lambda weights: bool(np.max(np.abs(long_run(weights, "thesis").control)) <= limit)
+        ),
+        "statement.no_dead_time": over_weights(unstable_with_dead_time),
+    }
+
+
+def over_weights(holds: Callable[[str], bool]) -> float:
+    """1 or 0 where a statement holds, or does not, with all of :data:`DESIGNS`; NaN where that depends on the weights.
+
+    What depends on weights that the thesis does not print cannot be reproduced.
+    """
+    answers = {holds(weights) for weights in DESIGNS}
+    return float(answers.pop()) if len(answers) == 1 else math.nan
+
+
+@cache
+def other_chapter_2() -> Design:
+    """Chapter 2 with a W_2 that is small where the reference is and rises beyond the corner of W_a.
+
+    Remark 1 asks for no more: a bound of the multiplicative uncertainty, and a W_1 with the poles of the reference,
+    here damped, and one pole beside them.
+    """
+    design = chapter_2()
+    (omega,), corner = design.reference_omegas, design.additive_bound.corner
+    poles = (-3 * DECAY_RATE + 1j * omega, -3 * DECAY_RATE - 1j * omega, complex(-3 * DECAY_RATE))
+    W1, W2 = Block(1.0, (), poles), Block(2.5, (complex(-corner),), (complex(-50 * corner),))
+    synthesis = mixed_sensitivity(design.blocks["G_A"], W1, W2, DECAY_RATE)
+    return replace(design, blocks={**design.blocks, "K": synthesis.K})
+
+
+DESIGNS: dict[str, Callable[[], Design]] = {"ours": chapter_2, "others": other_chapter_2}
+"""Chapter 2 with each choice of weights."""
+
+
+@cache
+def long_run(weights: str, anti_windup: str | None) -> Run:
+    """One of :data:`DESIGNS` under the printed limits, from rest, over :data:`PERIODS` periods of the reference.
+
+    Parameters
+    ----------
+    weights
+        "ours" or "others".
+    anti_windup
+        "thesis", or None for none.
+    """
+    design = DESIGNS[weights]()
+    reference = thesis_reference("delay-free", design.reference_omegas)
+    time_s = np.linspace(0.0, PERIODS * reference.period_s, 500 * PERIODS + 1)
+    loop = design_loop(design, reference, design.compensator(anti_windup) if anti_windup else None)
+    return run_all({"run": loop}, printed()["delay_free"]["limit"], time_s)["run"]
+
+
+def grows(run: Run) -> bool:
+    """Whether the largest |u| grows by more than a tenth from the first half of a run to the second."""
+    half = len(run.time_s) // 2
+    first, second = (np.max(np.abs(part)) for part in (run.control[:half], run.control[half:]))
+    return not second <= GROWTH * first  # NaN, after a divergence, grows
