@@ -53,7 +53,7 @@ def thesis_choice(bound: AdditiveBound) -> tuple[float, float, float]:
 
 
 def beta_grid(alpha: float) -> tuple[float, ...]:
-    """The values of beta that Fig. 2.10 compares, as multiples of alpha."""
+    """The values of beta that our Fig. 2.10 compares, as multiples of alpha; the thesis does not name its own."""
     return 2 * alpha, alpha, alpha / 2, alpha / 4
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,15 +14,16 @@ from experiments.claims_inputs import Inputs, plant_of
 from experiments.claims_statements import NOTHING, chapter_4
 from experiments.closed_loop import simulate
 from experiments.extended import extended_tables, usual_limit
-from experiments.loops import design_loop
+from experiments.loops import design_loop, pid_loop
 from experiments.metrics import last_saturation, over_last, settling_time
 from experiments.pid import STEP, pid_tables
-from experiments.scenarios import thesis_reference
+from experiments.scenarios import PidBenchmark, thesis_reference
 from experiments.tracking import SETTLED
 from identification.model import read_model
 from identification.plant import PlantModel
 from identification.thesis import printed
 
+BACK_CALCULATIONS = (1.0, 100.0)  # in 1/s; the first is the default of Simulink's block
 RAMP_S = 0.1  # long against the plant's slowest mode, short against the reference's period
 WINDOW_S, WINDOW_SAMPLES = 32.0, 2**16  # the plant's modes have died out by then; 0.5 ms
 
@@ -33,8 +35,8 @@ def pid(inputs: Inputs) -> dict[str, float]:
     those are taken that end nearer to the step. The overshoot, in percent, is the one with back-calculation.
 
     Statements: the printed gains stabilise the plant; without anti-windup the output overshoots, and the control
-    settles outside the actuator's range, with either gains; with it u and sat(u) coincide, and the output settles
-    sooner, with the gains that are taken.
+    settles outside the actuator's range, with either gains; with it u and sat(u) coincide (:func:`_coincide`), and the
+    output settles sooner, with the gains that are taken.
     """
     tables = pid_tables()
     runs, summary = tables["pid"], tables["pid_summary"].iloc[0]
@@ -55,7 +57,6 @@ def pid(inputs: Inputs) -> dict[str, float]:
         settling_time(time_s, runs[f"output_{taken}_{kind}"].to_numpy() - STEP, 2 * SETTLED * STEP)
         for kind in ("none", "back_calculation")
     )
-    excess = (runs[f"control_{taken}_back_calculation"] - runs[f"saturated_{taken}_back_calculation"]).abs()
     return {
         "pid.proportional": proportional,
         "pid.integral": integral,
@@ -63,9 +64,26 @@ def pid(inputs: Inputs) -> dict[str, float]:
         "statement.pid_stabilises": float(bool(np.all(rightmost_roots(_pid_linear_loop(*gains), 1).roots.real < 0))),
         "statement.pid_overshoot": float(min(summary[f"overshoot_{name}_none"] for name in ripple) > 0),
         "statement.pid_wound_up": float(any(wound_up)),
-        "statement.pid_coincide": float(excess.max() < SETTLED * limit),
+        "statement.pid_coincide": _coincide(proportional, integral),
         "statement.pid_sooner": float(with_it < without),
     }
+
+
+def _coincide(proportional: float, integral: float) -> float:
+    """Whether u and sat(u) coincide to 1 % of the limit from 1 s on, for every one of :data:`BACK_CALCULATIONS`.
+
+    1 for all, 0 for none; NaN if it depends on the gain, which section 2.2 does not print.
+    """
+    values = printed()["pid"]
+    plant = {name: values[name] for name in ("gain", "time_constant_s", "delay_s", "limit")}
+    benchmark = PidBenchmark(**plant, proportional=proportional, integral=integral, step=STEP)
+    time_s, limit = np.linspace(0.0, 150.0, 3001), values["limit"]
+    answers = set()
+    for gain in BACK_CALCULATIONS:
+        run = simulate(pid_loop(benchmark, gain), (-limit, limit), time_s)
+        excess = np.abs(run.control - run.saturated_control)[time_s >= 1.0]
+        answers.add(bool(excess.max() < SETTLED * limit))
+    return float(answers.pop()) if len(answers) == 1 else math.nan
 
 
 def _pid_linear_loop(proportional: float, integral: float) -> DelayLoop:
