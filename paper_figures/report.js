@@ -63,7 +63,11 @@ function toAddress() {
 form.hidden = false;
 form.addEventListener("input", toAddress);
 form.addEventListener("submit", (event) => event.preventDefault());
-form.addEventListener("reset", () => setTimeout(toAddress)); // after the fields are empty
+form.addEventListener("reset", (event) => {
+  event.preventDefault();
+  for (const name of names) form[name].value = "";
+  toAddress();
+});
 addEventListener("hashchange", fromAddress);
 
 // A column's head sorts: up, down, and back to the order of the thesis.

@@ -74,9 +74,9 @@ class Watched:
             .filter((row) => row.checkVisibility()).map((row) => row.querySelector("td.id").textContent)"""
         return list(self.page.evaluate(script))
 
-    def count(self) -> str:
-        """What the page says of how many there are."""
-        return self.page.locator("#count").inner_text()
+    def counts(self, said: str) -> None:
+        """Wait until the page says how many there are."""
+        expect(self.page.locator("#count")).to_have_text(said)
 
 
 @pytest.fixture
@@ -128,10 +128,10 @@ def test_each_filter_shows_exactly_its_rows(watched: Watched, ledger: pd.DataFra
     for value in sorted(set(ledger[column]) - {""}):
         watched.page.locator(f"select[name={column}]").select_option(value)
         expected = list(ledger["id"][ledger[column] == value])
+        watched.counts(f"{len(expected)} of {len(ledger)} rows")
         assert watched.shown() == expected
-        assert watched.count() == f"{len(expected)} of {len(ledger)} rows"
     watched.page.get_by_role("button", name="Show all").click()
-    assert watched.count() == f"{len(ledger)} of {len(ledger)} rows"
+    watched.counts(f"{len(ledger)} of {len(ledger)} rows")
     assert watched.shown() == list(ledger["id"])
 
 
@@ -140,8 +140,8 @@ def test_the_search_takes_any_words_of_a_row(watched: Watched, ledger: pd.DataFr
     for text in ("GAMMA", "\\frac{1}", "test_evidence.py rad/s", "<i>a</i>", "  section   pid ", "no row has this"):
         box.fill(text)
         expected = list(ledger["id"][searched(ledger, *text.split())])
+        watched.counts(f"{len(expected)} of {len(ledger)} rows")
         assert watched.shown() == expected
-        assert watched.count() == f"{len(expected)} of {len(ledger)} rows"
     assert not watched.shown()
 
 
@@ -176,7 +176,7 @@ def test_a_tile_leads_to_its_rows(watched: Watched, ledger: pd.DataFrame) -> Non
 
 def test_an_unknown_filter_in_the_address_shows_all(browser: Browser, address: str, ledger: pd.DataFrame) -> None:
     watched = Watched(browser, f"{address}#ledger?verdict=nonsense&other=1")
-    assert watched.count() == f"{len(ledger)} of {len(ledger)} rows"
+    watched.counts(f"{len(ledger)} of {len(ledger)} rows")
     watched.context.close()
     assert not watched.complaints
 
@@ -264,7 +264,7 @@ def test_without_scripts_all_rows_are_there(browser: Browser, address: str, ledg
     rows = watched.page.locator("#claims tbody tr")
     assert rows.count() == len(ledger)
     assert rows.last.is_visible()
-    assert watched.count() == f"{len(ledger)} of {len(ledger)} rows"
+    watched.counts(f"{len(ledger)} of {len(ledger)} rows")
     assert not watched.page.locator("#filter").is_visible()
     assert watched.page.get_by_text("need JavaScript to be saved").is_visible()
     assert watched.page.locator("img").first.is_visible()
