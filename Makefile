@@ -212,7 +212,7 @@ $(DISTRIBUTIONS) &: $(CAMPAIGN) experiments/campaign_tables.py | $(READY)
 
 # What the thesis does not print: about its text, whatever the MODEL.
 CONDITIONS := $(TRACKING) $(addprefix experiments/,unprinted_conditions.py unprinted_weights.py joint_conditions.py \
-	initial_output.py printed_outcomes.py printed_number.py claims.py claims_inputs.py claims_runs.py claims_statements.py pid.py extended.py delay_free.py)
+	initial_output.py printed_outcomes.py printed_number.py claims.py claims_inputs.py claims_runs.py claims_statements.py thesis_designs.py pid.py extended.py delay_free.py)
 $(call tables,conditions) &: $(CONDITIONS) $(wildcard design/*.py) $(CONTRACT) data/thesis/claims.csv | $(READY)
 	$(PY) -m experiments conditions --output $(RESULTS)
 

@@ -18,7 +18,7 @@ from identification.thesis import DATA
 
 LEDGER = DATA / "thesis" / "claims.csv"
 COLUMNS = ("id", "where", "quote", "printed", "unit", "kind", "compute", "status", "reason", "evidence")
-SLACK = 1e-9  # relative; 175^2 = 30625 lies half-way between the printed 3.062e4 and 3.063e4
+SLACK = 1e-9  # relative; the square of a printed frequency may lie half-way between two printed roundings of it
 
 FUNCTION = r"experiments\.\w+:[a-zA-Z]\w*"
 

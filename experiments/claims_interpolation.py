@@ -9,9 +9,10 @@ import numpy as np
 
 from design.stable_interpolation import Conditions, by_poles, by_zeros, conditions, lagrange
 from experiments.claims_inputs import Inputs, plant_of
-from experiments.claims_statements import NOTHING, chapter_4
+from experiments.claims_statements import NOTHING
 from experiments.extended import PADE_ORDER
 from experiments.interpolation_regions import interpolation_tables
+from experiments.thesis_designs import chapter_4
 from identification.files import InputError
 from identification.thesis import printed
 

@@ -28,7 +28,7 @@ both sides, on chapter 2's loop with our weights and with others, since the thes
 thesis chose or measured: they are compared with what this project uses, and count as transcribed, never as reproduced.
 
 The plant is the set `implied`, whose nine parameters are read off the printed theta_2. That the same nine give back
-theta_1, K_1, both G_A, C_aw and (4.8) but for its 285 is what the agreement of these says; that of theta_2 says
+theta_1, K_1, both G_A, C_aw and (4.8) but for omega_d1 is what the agreement of these says; that of theta_2 says
 nothing. C_0, F, K_0 and Table 4.2 follow from a, e, f, omega and T_d alone."""
 
 

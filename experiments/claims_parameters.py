@@ -37,7 +37,7 @@ def table_4_2(inputs: Inputs) -> dict[str, float]:
 def anti_windup(inputs: Inputs) -> dict[str, float]:
     """alpha, beta (s) and gamma of Thesis Eq. (2.23) by the procedure of section 2.4.
 
-    ``anti_windup.beta`` is the best of the four values that Fig. 2.10 compares, ``anti_windup.beta_continuous`` the
+    ``anti_windup.beta`` is the best of the four values that our Fig. 2.10 compares, ``anti_windup.beta_continuous`` the
     best of all.
     """
     found = f_gamma_tables(bound_from_dict(printed()["additive_bound"]))["f_gamma_summary"].iloc[0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,19 +10,20 @@ from design.block import Block
 from design.extended import design_extended
 from design.quasi_polynomial import DelayLoop, rightmost_roots
 from experiments.claims_inputs import Inputs, plant_of
-from experiments.claims_statements import NOTHING, chapter_4
+from experiments.claims_statements import NOTHING, unanimous
 from experiments.closed_loop import simulate
-from experiments.extended import extended_tables, usual_limit
+from experiments.extended import PERIODS, extended_tables
 from experiments.loops import design_loop, pid_loop
 from experiments.metrics import last_saturation, over_last, settling_time
-from experiments.pid import STEP, pid_tables
-from experiments.scenarios import PidBenchmark, thesis_reference
+from experiments.pid import BACK_CALCULATION, HORIZON_S, STEP, pid_tables, printed_benchmark
+from experiments.scenarios import thesis_reference
+from experiments.thesis_designs import chapter_4
 from experiments.tracking import SETTLED
 from identification.model import read_model
 from identification.plant import PlantModel
 from identification.thesis import printed
 
-BACK_CALCULATIONS = (1.0, 100.0)  # in 1/s; the first is the default of Simulink's block
+BACK_CALCULATIONS = (BACK_CALCULATION, 100 * BACK_CALCULATION)  # in 1/s
 RAMP_S = 0.1  # long against the plant's slowest mode, short against the reference's period
 WINDOW_S, WINDOW_SAMPLES = 32.0, 2**16  # the plant's modes have died out by then; 0.5 ms
 
@@ -72,18 +72,17 @@ def pid(inputs: Inputs) -> dict[str, float]:
 def _coincide(proportional: float, integral: float) -> float:
     """Whether u and sat(u) coincide to 1 % of the limit from 1 s on, for every one of :data:`BACK_CALCULATIONS`.
 
-    1 for all, 0 for none; NaN if it depends on the gain, which section 2.2 does not print.
+    Section 2.2 does not print the gain, see :func:`experiments.claims_statements.unanimous`.
     """
-    values = printed()["pid"]
-    plant = {name: values[name] for name in ("gain", "time_constant_s", "delay_s", "limit")}
-    benchmark = PidBenchmark(**plant, proportional=proportional, integral=integral, step=STEP)
-    time_s, limit = np.linspace(0.0, 150.0, 3001), values["limit"]
-    answers = set()
-    for gain in BACK_CALCULATIONS:
+    benchmark = replace(printed_benchmark(), proportional=proportional, integral=integral)
+    time_s, limit = np.linspace(0.0, HORIZON_S, 3001), benchmark.limit
+
+    def coincide(gain: float) -> bool:
         run = simulate(pid_loop(benchmark, gain), (-limit, limit), time_s)
         excess = np.abs(run.control - run.saturated_control)[time_s >= 1.0]
-        answers.add(bool(excess.max() < SETTLED * limit))
-    return float(answers.pop()) if len(answers) == 1 else math.nan
+        return bool(excess.max() < SETTLED * limit)
+
+    return unanimous(coincide(gain) for gain in BACK_CALCULATIONS)
 
 
 def _pid_linear_loop(proportional: float, integral: float) -> DelayLoop:
@@ -114,29 +113,29 @@ def extended(inputs: Inputs) -> dict[str, float]:
     half the dead time leaves saturation at another time; y + y_d is the linear response (Lemma 2).
     """
     summary = extended_tables(chapter_4())["extended_summary"].set_index("run")
-    last = summary["relative_error_percent"]
+    last, limit = summary["relative_error_percent"], float(summary["limit"]["thesis"])
     amplitude = printed()["extended"]["reference"]["amplitude"]
     return {
         "extended.tracking_error": float(summary["peak_error_after_1s"]["none"]),
         "extended.recovery_s": float(summary["last_saturation_s"]["thesis"]),
         "statement.difference_without": float(summary["peak_error_after_1s"]["none"] > SETTLED * amplitude),
-        "statement.delay_matters": float(abs(_recovery(0.5) - summary["last_saturation_s"]["thesis"]) > 1e-3),
+        "statement.delay_matters": float(abs(_recovery(0.5, limit) - summary["last_saturation_s"]["thesis"]) > 1e-3),
         "statement.error_converges": float(last["thesis"] < 100 * SETTLED),
         "statement.minimises_error": float(last["thesis"] < last["none"]),
-        "statement.lemma_2": float(_y_lin_is_linear(summary["limit"]["thesis"])),
+        "statement.lemma_2": float(_y_lin_is_linear(limit)),
     }
 
 
-def _recovery(share: float) -> float:
-    """``extended.recovery_s`` of a design for the plant with this share of its dead time, under the same limits."""
+def _recovery(share: float, limit: float) -> float:
+    """``extended.recovery_s`` under +-limit of a design for the plant with this share of its dead time."""
     design = chapter_4()
     model = read_model("implied")
     shorter = replace(model, plant=replace(model.plant, delay_s=share * model.plant.delay_s))
     chosen = design.parameters
     other = design_extended(shorter, design.reference_omegas, chosen["a"], chosen["pairs"])
-    limit, reference = usual_limit(design), thesis_reference("extended", design.reference_omegas)
+    reference = thesis_reference("extended", design.reference_omegas)
     loop = design_loop(other, reference, other.compensator("thesis"))
-    return last_saturation(simulate(loop, (-limit, limit), np.array([0.0, 5 * reference.period_s])))
+    return last_saturation(simulate(loop, (-limit, limit), np.array([0.0, PERIODS * reference.period_s])))
 
 
 def _y_lin_is_linear(limit: float) -> bool:

@@ -107,7 +107,7 @@ def K1(inputs: Inputs) -> dict[str, float]:
 def G_A_extended(inputs: Inputs) -> dict[str, float]:
     """G_A = P/(1 + F) of section 4.2, with its dead time, see :func:`_over_one_plus_F`.
 
-    ``G_A_4.form_gain`` is the gain that the printed form, without the (930, 960) pair, needs to be G_A at low
+    ``G_A_4.form_gain`` is the gain that the printed form, without the fastest pair, needs to be G_A at low
     frequencies.
     """
     plant = plant_of(inputs)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -13,10 +12,11 @@ from design.block import Block
 from design.contract import Design
 from design.mixed_sensitivity import mixed_sensitivity
 from experiments.claims_inputs import Inputs
-from experiments.claims_statements import chapter_2
+from experiments.claims_statements import unanimous
 from experiments.closed_loop import Run
 from experiments.loops import design_loop
 from experiments.scenarios import thesis_reference
+from experiments.thesis_designs import chapter_2
 from experiments.tracking import SETTLED, run_all
 from identification.thesis import printed
 
@@ -53,12 +53,8 @@ def delay_free_runs(inputs: Inputs) -> dict[str, float]:
 
 
 def over_weights(holds: Callable[[str], bool]) -> float:
-    """1 or 0 where a statement holds, or does not, with all of :data:`DESIGNS`; NaN where that depends on the weights.
-
-    What depends on weights that the thesis does not print cannot be reproduced.
-    """
-    answers = {holds(weights) for weights in DESIGNS}
-    return float(answers.pop()) if len(answers) == 1 else math.nan
+    """Whether a statement holds with all of :data:`DESIGNS`, see :func:`experiments.claims_statements.unanimous`."""
+    return unanimous(holds(weights) for weights in DESIGNS)
 
 
 @cache

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -14,17 +13,15 @@ import numpy as np
 
 from design.block import plant_block
 from design.contract import Design
-from design.extended import design_extended
 from design.realization import realize
-from experiments.closed_loop import DivergenceError, Run, simulate
 from experiments.extended import PADE_ORDER, PERIODS
 from experiments.loops import design_loop
 from experiments.pade import with_pade
 from experiments.printed_outcomes import with_anti_windup, without_anti_windup
 from experiments.saturated_loop import SaturatedLoop
 from experiments.scenarios import Reference, thesis_reference
-from identification.model import read_model
-from identification.thesis import printed
+from experiments.thesis_designs import chapter_4
+from experiments.tracking import run_all
 
 SETS = ("implied", "table")
 DELAYS = ("exact", "pade")
@@ -59,10 +56,8 @@ class Conditions:
 
     @cached_property
     def design(self) -> Design:
-        """By the zeros of Q with the printed a, e, f (Table 4.1)."""
-        chosen = printed()["extended"]
-        omega, pairs = chosen["reference"]["omega"], [(chosen["e"], chosen["f"])]
-        return design_extended(read_model(self.set_name), [omega], chosen["a"], pairs)
+        """Chapter 4's."""
+        return chapter_4(self.set_name)
 
     @cached_property
     def reference(self) -> Reference:
@@ -98,15 +93,8 @@ class Conditions:
         """
         period = self.reference.period_s
         time_s = np.linspace(0.0, PERIODS * period, PERIODS * samples + 1)
-        try:
-            run = simulate(self.loop(kind, point.output), (-point.limit, point.limit), time_s)
-        except DivergenceError:
-            still = Run(time_s, time_s, time_s, {"error": time_s}, np.zeros(0), np.zeros(0, int))
-            return dict.fromkeys(self._read(kind, still), math.nan)
-        return self._read(kind, run)
-
-    def _read(self, kind: str, run: Run) -> dict[str, float]:
-        period = self.reference.period_s
+        loop = self.loop(kind, point.output)
+        run = run_all({kind: loop}, point.limit, time_s)[kind]
         if kind == "none":
             return without_anti_windup(run, period)
         return with_anti_windup(run, self.reference.amplitude, period)

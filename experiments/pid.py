@@ -33,16 +33,7 @@ def pid_tables() -> dict[str, pd.DataFrame]:
     As printed the loop limit-cycles, and it still oscillates with back-calculation; the text's description fits the
     swapped gains.
     """
-    values = printed()["pid"]
-    as_printed = PidBenchmark(
-        gain=values["gain"],
-        time_constant_s=values["time_constant_s"],
-        delay_s=values["delay_s"],
-        proportional=values["printed_proportional"],
-        integral=values["printed_integral"],
-        limit=values["limit"],
-        step=STEP,
-    )
+    as_printed = printed_benchmark()
     swapped = replace(as_printed, proportional=as_printed.integral, integral=as_printed.proportional)
     time_s = np.linspace(0.0, HORIZON_S, 3001)
     columns: dict[str, np.ndarray] = {"time_s": time_s, "reference": np.full(len(time_s), STEP)}
@@ -55,3 +46,17 @@ def pid_tables() -> dict[str, pd.DataFrame]:
             columns[f"saturated_{gains}_{kind}"] = run.saturated_control
             summary[f"overshoot_{gains}_{kind}"] = 100 * (run.outputs["output"].max() / STEP - 1)
     return {"pid": pd.DataFrame(columns), "pid_summary": pd.DataFrame([summary])}
+
+
+def printed_benchmark() -> PidBenchmark:
+    """Plant, limits and gains of section 2.2 as printed, with a step of :data:`STEP`."""
+    values = printed()["pid"]
+    return PidBenchmark(
+        gain=values["gain"],
+        time_constant_s=values["time_constant_s"],
+        delay_s=values["delay_s"],
+        proportional=values["printed_proportional"],
+        integral=values["printed_integral"],
+        limit=values["limit"],
+        step=STEP,
+    )

@@ -15,10 +15,8 @@ from scipy.optimize import brentq
 
 from design.block import Block
 from design.contract import Design
-from design.delay_free import design_delay_free
 from design.mixed_sensitivity import SynthesisError, mixed_sensitivity
 from experiments.claims_runs import least_peak_error
-from experiments.closed_loop import DivergenceError, simulate
 from experiments.delay_free import PERIODS
 from experiments.initial_output import Tick, starting_at, threaded
 from experiments.loops import design_loop
@@ -26,8 +24,9 @@ from experiments.metrics import over_last
 from experiments.printed_outcomes import Found, compared, printed_outcomes, where_met
 from experiments.saturated_loop import SaturatedLoop
 from experiments.scenarios import Reference, thesis_reference
+from experiments.thesis_designs import chapter_2
+from experiments.tracking import run_all
 from identification.files import InputError
-from identification.model import read_model
 from identification.thesis import printed
 
 SAMPLES_PER_PERIOD = 500
@@ -82,12 +81,6 @@ def usual_weights() -> tuple[Weights, ...]:
 def usual_limits() -> np.ndarray:
     """Limits as multiples of the input that the reference takes, crowding towards it from below."""
     return np.concatenate([1 - np.geomspace(0.3, 1e-3, 32), np.linspace(1.0, 1.6, 13)])
-
-
-def usual_design(set_name: str) -> Design:
-    """Chapter 2's design of a parameter set, with the printed period and epsilon and the weights that are ours."""
-    chosen = printed()["delay_free"]
-    return design_delay_free(read_model(set_name), chosen["reference"]["period_s"], chosen["epsilon"])
 
 
 def with_weights(design: Design, weights: Weights) -> Design:
@@ -146,11 +139,8 @@ def errors(of: Loop, limit: float, output: float) -> dict[str, float]:
     """
     period, amplitude = of.reference.period_s, of.reference.amplitude
     time_s = np.linspace(0.0, PERIODS * period, PERIODS * SAMPLES_PER_PERIOD + 1)
-    try:
-        run = simulate(starting_at(of.loop, of.design, output), (-limit, limit), time_s)
-        offset, ripple = over_last(time_s, run.outputs["error"], period)
-    except DivergenceError:
-        offset, ripple = math.nan, math.nan
+    run = run_all({"run": starting_at(of.loop, of.design, output)}, limit, time_s)["run"]
+    offset, ripple = over_last(time_s, run.outputs["error"], period)
     peak = abs(offset) + ripple
     shares = {"peak_percent": 100 * peak / amplitude, "peak_share": peak / amplitude}
     return {"peak": peak, **shares, "ripple_percent": 100 * ripple / amplitude, "offset": offset}
@@ -196,7 +186,7 @@ def delay_free_scan(
     """
     limits = usual_limits() if limits is None else limits
     weights = usual_weights() if weights is None else weights
-    usual = {name: loop_of(usual_design(name)) for name in sets}
+    usual = {name: loop_of(chapter_2(name)) for name in sets}
     jobs = [
         (name, float(share * of.reference.required(of.design.loop_plant)), output)
         for name, of in usual.items()
@@ -248,7 +238,7 @@ def delay_free_rows(sets: Sequence[str], scan: pd.DataFrame, tick: Tick = lambda
     number = printed_outcomes()[OUTCOME]
     head = {"outcome": OUTCOME, "delay": "none"}
     for name in sets:
-        of, own = loop_of(usual_design(name)), scan[scan["set"] == name]
+        of, own = loop_of(chapter_2(name)), scan[scan["set"] == name]
         over_limits = own[own["weights"] == str(USUAL)].drop_duplicates(["initial_output", "limit"])
         over_limits = over_limits.groupby("initial_output").filter(lambda group: len(group) > 2).sort_values("limit")
         for output, group in over_limits.groupby("initial_output"):

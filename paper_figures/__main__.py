@@ -10,7 +10,7 @@ from importlib import import_module
 from io import StringIO
 from pathlib import Path
 from traceback import walk_tb
-from typing import Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Protocol, TypeVar, cast
 
 import click
 import pandas as pd
@@ -19,6 +19,9 @@ from matplotlib.figure import Figure
 import paper_figures
 from identification.files import CommandGroup, InputError, read_text
 from paper_figures import style
+
+if TYPE_CHECKING:
+    from design.contract import Design
 
 Result = TypeVar("Result")
 
@@ -74,21 +77,16 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
 def summary_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
     """Sum up MODEL, fitted to SWEEP files, its designs, and what was refused: summary.pdf, .svg, .png and .txt."""
     # only here: they take a second to import, and no figure needs them
-    from design.contract import read_design
     from identification.discretised import alias_free
     from identification.frequency_response import read_sweeps
     from identification.model import read_model
     from paper_figures import summary_page
     from paper_figures.summary import summarise
-    from paper_figures.summary_of_designs import FOLLOWING
 
     identified = read_model(model)
     tests = [alias_free(test, identified.plant) for test in read_sweeps(sweeps)]
-    designs = read_attempts({name: build / f"design_{name}" for name in FOLLOWING}, ".json", read_design)
-    experiments = [name for names in FOLLOWING.values() for name in names]
-    outcomes = read_attempts({name: build / "results" / name for name in experiments}, "_summary.csv", read_table)
-    tables = {f"{name}_summary": table for name, table in outcomes.items() if isinstance(table, pd.DataFrame)}
-    with missing_columns_named(tables, build / "results", "summary"):
+    designs, outcomes = read_build(build, "summary")
+    with missing_columns_named(summaries(outcomes), build / "results", "summary"):
         said = summarise(identified, tests, designs, outcomes)
     page = summary_page.draw(said, identified, tests)
     style.save(page, build, "summary", said.text())
@@ -109,20 +107,14 @@ def summary_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
 def report_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
     """Put all that was made for MODEL (a model.json, table or implied) and SWEEP files on one page of HTML."""
     # only here, as above
-    from design.contract import read_design
     from paper_figures.report import write_report
     from paper_figures.report_content import report_content
     from paper_figures.report_inputs import read_inputs
-    from paper_figures.summary_of_designs import FOLLOWING
 
-    designs = read_attempts({name: build / f"design_{name}" for name in FOLLOWING}, ".json", read_design)
-    experiments = [name for names in FOLLOWING.values() for name in names]
-    stems = {name: build / "results" / name for name in experiments}
-    outcomes = read_attempts(stems, "_summary.csv", partial(read_table, figure="report"))
+    designs, outcomes = read_build(build, "report")
     figures = {name: figure_module(name).TABLES for name in figure_names()}
     inputs = read_inputs(model, sweeps, build, figures, designs, outcomes)
-    tables = {f"{name}_summary": table for name, table in outcomes.items() if isinstance(table, pd.DataFrame)}
-    with missing_columns_named(tables, build / "results", "report"):
+    with missing_columns_named(summaries(outcomes), build / "results", "report"):
         content = report_content(inputs)
     click.echo(f"{len(content.rows)} claims, {len(figures)} figures -> {write_report(content, build, inputs.files)}")
 
@@ -145,6 +137,34 @@ def figure_module(name: str) -> FigureModule:
     if name not in figure_names():
         raise InputError(f"{name}: no such figure; the figures are {', '.join(figure_names())}")
     return cast(FigureModule, import_module(f"paper_figures.{name}"))
+
+
+def read_build(build: Path, figure: str) -> tuple[dict[str, Design | str], dict[str, pd.DataFrame | str]]:
+    """Return the designs and the summaries of the experiments in a build folder, or why each was refused.
+
+    Parameters
+    ----------
+    build
+        The folder of the designs, with the tables in its folder results.
+    figure
+        What needs them, for the message.
+
+    Raises
+    ------
+    InputError
+        A file is not what it should be.
+    """
+    from design.contract import read_design
+    from paper_figures.summary_of_designs import FOLLOWING
+
+    designs = read_attempts({name: build / f"design_{name}" for name in FOLLOWING}, ".json", read_design)
+    stems = {name: build / "results" / name for names in FOLLOWING.values() for name in names}
+    return designs, read_attempts(stems, "_summary.csv", partial(read_table, figure=figure))
+
+
+def summaries(outcomes: Mapping[str, pd.DataFrame | str]) -> dict[str, pd.DataFrame]:
+    """Return the tables among outcomes by the names of their files."""
+    return {f"{name}_summary": table for name, table in outcomes.items() if isinstance(table, pd.DataFrame)}
 
 
 def read_attempts(stems: Mapping[str, Path], end: str, read: Callable[[Path], Result]) -> dict[str, Result | str]:

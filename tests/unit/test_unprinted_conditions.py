@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from experiments import unprinted_conditions, unprinted_weights
+from experiments import thesis_designs, unprinted_conditions, unprinted_weights
 from experiments.__main__ import main
 from experiments.closed_loop import Run, simulate
 from experiments.initial_output import Conditions, Point, starting_at, with_pade_at_rest
@@ -28,7 +28,7 @@ from experiments.printed_outcomes import (
     without_anti_windup,
 )
 from experiments.unprinted_conditions import Grid, alone, every_condition, grid_of, scanned
-from experiments.unprinted_weights import Weights, delay_free_rows, delay_free_scan, errors, loop_of, usual_design
+from experiments.unprinted_weights import Weights, delay_free_rows, delay_free_scan, errors, loop_of
 from identification.thesis import printed
 
 COARSE = Grid(np.array([0.9, 1.1, 1.2, 1.3, 1.6, 1.9, 2.4]), np.array([1.001, 1.05, 1.1]), np.linspace(0.8, 1.2, 3))
@@ -295,12 +295,12 @@ def test_a_misprinted_limit_would_give_the_error_of_chapter_2(needs: pd.DataFram
         0
     ]
     assert row["limit"] == pytest.approx(10.98, abs=0.005)
-    again = errors(loop_of(usual_design("implied")), row["limit"], 0.0)["peak_percent"]
+    again = errors(loop_of(thesis_designs.chapter_2("implied")), row["limit"], 0.0)["peak_percent"]
     assert abs(again - row["printed"]) <= row["tolerance"]
 
 
 def test_weights_that_are_the_usual_ones_give_the_usual_stabiliser() -> None:
-    design = usual_design("implied")
+    design = thesis_designs.chapter_2("implied")
     K, again = design.blocks["K"], unprinted_weights.with_weights(design, Weights()).blocks["K"]
     s = 1j * np.geomspace(0.1, 1e3, 20)
     np.testing.assert_allclose(again(s), K(s), rtol=1e-6)
