@@ -8,9 +8,11 @@
 
 #define ORDER 60
 #define NEGLIGIBLE 1e-14
+#define ROUNDING 1e-16
 #define NOTHING 1e-30
 #define DIVERGENT 1e100
 #define LANES 16
+#define LANED(count) (((count) + LANES - 1) / LANES * LANES)
 #define BEYOND 0.5
 #define JUMP 1e-9
 #define MOST 256 /* states, delayed signals and watched signals, each */
@@ -58,8 +60,8 @@ static double gap(double *left, int left_degree, double moved, const double *rig
     return most;
 }
 
-static void advance(const Sparse *restrict matrix, double *restrict V, int stride, int n, int known, int most,
-                    const double *restrict scale, double step, double reach, double *restrict x) {
+static void advance(const Sparse *restrict matrix, const double *influence, double *restrict V, int stride, int n,
+                    int known, int most, double *restrict scale, double step, double reach, double *restrict x) {
     double power = 1.0;
     memcpy(x, V, n * sizeof *x);
     for (int i = 0; i < most; i++) {
@@ -71,10 +73,20 @@ static void advance(const Sparse *restrict matrix, double *restrict V, int strid
             following[r] = term;
             term *= power;
             x[r] += term;
+            scale[r] = fmax(scale[r], fabs(x[r]));
             if (negligible && fabs(term) > NEGLIGIBLE * scale[r]) negligible = 0;
+        }
+        for (int r = 0; r < n && negligible; r++) {
+            double bound = 0.0;
+            for (int c = 0; c < n; c++) bound += influence[r * LANED(n) + c] * fabs(following[c]);
+            negligible = bound * power * reach <= (i + 2) * NEGLIGIBLE * scale[r];
         }
         if (negligible) break;
     }
+}
+
+static void state_terms(const double *terms, int wide, int degree, const double *z, int columns, double *size, int n) {
+    for (int r = 0; r < n; r++) size[r] = fabs(dot(terms + (size_t)(n * degree + r) * wide, z, columns));
 }
 
 static int sign_changes(const double *b, int n) {
@@ -189,8 +201,8 @@ static int insert(double *queue, int queued, double t, double near) {
 
 /* The number of events; values (1 + watched, count), events (most_events,). -1: divergence, -2: too little room. */
 int integrate(const uint32_t *indptr, const uint32_t *indices, const double *data, const uint32_t *indptr_m,
-              const uint32_t *indices_m, const double *data_m, const double *increments, const double *polynomials, int n,
-              int k, int watched, int most, int wide, const double *delays, const double *x0, double low, double high,
+              const uint32_t *indices_m, const double *data_m, const double *increments, const double *polynomials,
+              const double *terms, const double *magnitudes, const double *influence, int n, int k, int watched, int most, int wide, const double *delays, const double *x0, double low, double high,
               double horizon, double step, const double *samples, const int64_t *groups, int lags,
               int count, int most_events, int room, double *values, double *events) {
     const Sparse unsaturated = {indptr, indices, data}, saturated = {indptr_m, indices_m, data_m};
@@ -208,6 +220,7 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
     double *history = malloc((size_t)room * k * (most + 1) * sizeof *history);
 #define PIECE(p, j) (history + ((size_t)((p) & wrap) * k + (j)) * (most + 1))
     double *V = calloc((size_t)(most + 1) * stride, sizeof *V), *z = calloc(wide, sizeof *z), W[ORDER + 1];
+    double *sizes = calloc(wide, sizeof *sizes), now[MOST], later[MOST], negligible[MOST];
     double P[MOST][ORDER + 1], x[MOST], scale[MOST], size[MOST] = {0}, seen[MOST] = {0}, rest[MOST];
     memcpy(V, x0, n * sizeof *V);
     for (int j = 0; j < k; j++) rest[j] = times(&unsaturated, n + 1 + j, V);
@@ -218,7 +231,7 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
             for (int o = groups[g]; o < groups[g + 1]; o++)
                 values[(1 + o) * count + sample[g]] = times(&unsaturated, n + 1 + k + o, V);
     double u = times(&unsaturated, n, V), t = 0.0;
-    int mode = u > high ? 1 : u < low ? -1 : 0, kink = 1, on_limit = 0, standing = 0, result = 0;
+    int mode = u > high ? 1 : u < low ? -1 : 0, kink = 1, on_limit = 0, standing = 0, result = 0, usual = 0;
 
     while (t < horizon && !result) {
         double t_next = fmin(t + step, horizon), radius;
@@ -247,25 +260,44 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
             filled[j] = degree;
             if (degree > known) known = degree;
         }
-        const double *increment = increments, *polynomial = polynomials;
-        if (mode) increment += (size_t)n * wide, polynomial += (size_t)signals * (most + 1) * wide;
+        const double *increment = increments, *polynomial = polynomials, *term = terms, *magnitude = magnitudes;
+        const double *weight = influence;
+        if (mode) {
+            increment += (size_t)n * wide, polynomial += (size_t)signals * (most + 1) * wide;
+            term += (size_t)n * (most + 1) * wide, magnitude += (size_t)signals * wide;
+            weight += (size_t)(signals + n) * LANED(n);
+        }
         memcpy(z, x, n * sizeof *z);
         z[n] = mode == 0 ? 0.0 : mode == 1 ? high : low;
-#define WHOLE_LANES(count) (((count) + LANES - 1) / LANES * LANES)
-        int columns = WHOLE_LANES(n + 1 + k * (known + 1));
+        int columns = LANED(n + 1 + k * (known + 1));
         double power = 1.0;
         radius = fmin(1.0, (t_next - t) / step + BEYOND);
+        for (int c = 0; c < columns; c++) sizes[c] = fabs(z[c]);
+        for (int s = 0; s <= k; s++) negligible[s] = ROUNDING * dot(magnitude + (size_t)s * wide, sizes, columns);
         for (degree = 0;; degree++, power *= radius) {
-            int small = degree > known, upto = small ? columns : WHOLE_LANES(n + 1 + k * (degree + 1));
+            int small = degree > known, upto = small ? columns : LANED(n + 1 + k * (degree + 1));
             for (int s = 0; s <= k; s++) {
                 double c = dot(polynomial + (size_t)(signals * degree + s) * wide, z, upto);
-                if (degree == 0 && fabs(c) > size[s]) size[s] = fabs(c);
+                if (degree == 0) {
+                    size[s] = fmax(size[s], fabs(c));
+                    negligible[s] = fmax(negligible[s], NEGLIGIBLE * size[s]);
+                }
                 P[s][degree] = fabs(c) > NOTHING * size[s] ? c : 0.0;
-                small = small && fabs(c) * power <= NEGLIGIBLE * size[s];
+                small = small && fabs(c) * power <= negligible[s];
             }
             quiet = small ? quiet + 1 : 0;
-            if (quiet == 2 || degree == most) break;
+            if (quiet > 1 && degree >= usual - 1) {
+                state_terms(term, wide, degree, z, columns, now, n);
+                for (int s = 0; s <= k; s++)
+                    small = small && dot(weight + s * LANED(n), now, n) * power <= negligible[s] * (degree + 1);
+                if (small) break;
+            }
+            if (degree == most) {
+                memset(now, 0, sizeof now);
+                break;
+            }
         }
+        usual = degree;
         int whole = fabs(t_next - t - step) <= 1e-15 * (step + t), entered, crossed;
         double reach = whole ? 1.0 : fmax((t_next - t - late) / step, 0.0), late_next = 0.0;
         double exit_at = leave(P[0], degree, mode, on_limit, standing > 2, low, high, reach, &entered, &crossed);
@@ -302,13 +334,20 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
             for (int o = g == 0 ? -1 : groups[g]; o < groups[g + 1]; o++) {
                 int top = degree;
                 if (o >= 0) {
-                    int calm = 0;
-                    for (top = 0;; top++) {
-                        W[top] = dot(polynomial + (size_t)(signals * top + 1 + k + o) * wide, z, columns);
-                        seen[o] = fmax(seen[o], fabs(W[top]));
-                        calm = top > known && fabs(W[top]) <= NEGLIGIBLE * seen[o] ? calm + 1 : 0;
-                        if (calm == 2 || top == most) break;
+                    int row = 1 + k + o;
+                    for (int i = 0; i <= top; i++)
+                        W[i] = dot(polynomial + (size_t)(signals * i + row) * wide, z, columns);
+                    seen[o] = fmax(seen[o], fabs(W[0]));
+                    double rounding = ROUNDING * dot(magnitude + (size_t)row * wide, sizes, columns);
+                    double bound = dot(weight + row * LANED(n), now, n) / (top + 1);
+                    while (top < most && bound > fmax(NEGLIGIBLE * seen[o], rounding)) {
+                        top++;
+                        W[top] = dot(polynomial + (size_t)(signals * top + row) * wide, z, columns);
+                        state_terms(term, wide, top, z, columns, later, n);
+                        bound = dot(weight + row * LANED(n), later, n) / (top + 1);
                     }
+                    double left_out = fabs(W[top]);
+                    while (top > 0 && left_out <= ROUNDING * seen[o]) left_out += fabs(W[--top]);
                 }
                 for (int s = begin; s < until; s++)
                     values[(1 + o) * count + s] = horner(o < 0 ? P[0] : W, top, (at[s] - t - late) / step);
@@ -327,7 +366,7 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
                     power /= reach;
                 if (top > driven) driven = top;
             }
-            advance(mode ? &saturated : &unsaturated, V, stride, n, driven, most, scale, step, reach, x);
+            advance(mode ? &saturated : &unsaturated, weight + signals * LANED(n), V, stride, n, driven, most, scale, step, reach, x);
             for (int i = 0; i <= known; i++) memset(V + i * stride + n + 1, 0, k * sizeof *V);
         }
         for (int r = 0; r < n; r++) {
@@ -347,6 +386,6 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
         queued -= passed;
         if (passed) memmove(queue, queue + passed, queued * sizeof *queue);
     }
-    free(starts), free(lates), free(radii), free(queue), free(degrees), free(history), free(V), free(z);
+    free(starts), free(lates), free(radii), free(queue), free(degrees), free(history), free(V), free(z), free(sizes);
     return result ? result : event_count;
 }

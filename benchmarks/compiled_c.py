@@ -39,7 +39,8 @@ def c_run(loop: SaturatedLoop, limit: float, time_s: np.ndarray) -> Callable[[],
 
     ready = compile_loop(loop)
     n, k, watched = len(ready.x0), len(ready.delays), ready.reading.shape[1]
-    most, wide = ready.polynomials.shape[1] // (1 + k + watched) - 1, ready.increments.shape[2]
+    tables = ready.tables
+    most, wide = tables.polynomials.shape[1] // (1 + k + watched) - 1, tables.increments.shape[2]
     samples = np.ascontiguousarray(time_s - ready.lags[:, None])
     groups = ready.groups.astype(np.int64)
     values, events = np.zeros((1 + watched, len(time_s))), np.zeros(MOST_EVENTS)
@@ -48,7 +49,7 @@ def c_run(loop: SaturatedLoop, limit: float, time_s: np.ndarray) -> Callable[[],
         return array.ctypes.data_as(ctypes.c_void_p)  # keeps the array
 
     arguments = [
-        *(at(part) for part in (*ready.unsaturated, *ready.saturated, ready.increments, ready.polynomials)),
+        *(at(part) for part in (*ready.unsaturated, *ready.saturated, *tables)),
         *(n, k, watched, most, wide),
         *(at(part) for part in (ready.delays, ready.x0)),
         *(ctypes.c_double(number) for number in (-limit, limit, time_s[-1], ready.step)),

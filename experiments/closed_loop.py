@@ -87,7 +87,7 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
     horizon = float(time_s[-1])
     most_events, room = 4096, _room(compiled)
     while True:
-        if room * compiled.increments.shape[2] > MOST_ROOM:
+        if room * compiled.tables.increments.shape[2] > MOST_ROOM:
             raise InputError(
                 f"the dead times reach from {compiled.delays.min():.3g} to {compiled.delays.max():.3g} s, too many "
                 "steps to remember; expected dead times that differ less, or zero"
@@ -101,8 +101,7 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
         values, events, modes, status, end, _, tail = taylor.integrate(
             compiled.unsaturated,
             compiled.saturated,
-            compiled.increments,
-            compiled.polynomials,
+            compiled.tables,
             compiled.delays,
             compiled.x0,
             loop.resets.times_s,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.propagator import Rows, compressed, tabulate, whole_lanes
+from experiments.propagator import Rows, Tables, compressed, tabulate, whole_lanes
 from experiments.saturated_loop import SaturatedLoop
 
 FURTHEST = 4.0  # fastest root times step: the terms of a series grow to exp of it, and two digits are lost
@@ -18,7 +19,7 @@ class CompiledLoop:
 
     Parameters
     ----------
-    unsaturated, saturated, increments, polynomials, delays, x0, step, groups
+    unsaturated, saturated, tables, delays, x0, step, groups
         As there.
     lags
         Shape (g,): how much earlier each group is sampled, in seconds; zero first.
@@ -28,8 +29,7 @@ class CompiledLoop:
 
     unsaturated: Rows
     saturated: Rows
-    increments: np.ndarray
-    polynomials: np.ndarray
+    tables: Tables
     delays: np.ndarray
     x0: np.ndarray
     step: float
@@ -64,15 +64,14 @@ def compile_loop(loop: SaturatedLoop, most_step: float = np.inf) -> CompiledLoop
     elif np.isinf(step):
         step = 1.0  # of integrators alone, whose series end by themselves
     while True:
-        tables = [tabulate(rows, n, k, step) for rows in (unsaturated, saturated)]
-        if all(degree >= 0 for _, _, degree in tables):
+        both = [tabulate(rows, n, k, step) for rows in (unsaturated, saturated)]
+        if all(degree >= 0 for _, degree in both):
             break
         step /= 2
     return CompiledLoop(
         unsaturated=unsaturated,
         saturated=saturated,
-        increments=_stacked([increments for increments, _, _ in tables]),
-        polynomials=_stacked([polynomials for _, polynomials, _ in tables]),
+        tables=Tables(*(_stacked(pair) for pair in zip(*(tables for tables, _ in both), strict=True))),
         delays=delays,
         x0=loop.x0,
         step=step,
@@ -120,7 +119,7 @@ def _watched(loop: SaturatedLoop) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
     return np.array(rows).reshape(len(rows), len(loop.x0)), np.array(groups), np.array(lags), reading
 
 
-def _stacked(tables: list[np.ndarray]) -> np.ndarray:
+def _stacked(tables: Sequence[np.ndarray]) -> np.ndarray:
     """Tables on one another, filled with zeros to one size and to whole lanes."""
     rows, columns = np.max([table.shape for table in tables], axis=0)
     stack = np.zeros((len(tables), rows, whole_lanes(columns)))

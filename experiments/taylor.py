@@ -17,7 +17,19 @@ from numpy.typing import NDArray
 
 from experiments.crossings import leave
 from experiments.mesh import gap, insert, shift
-from experiments.propagator import NEGLIGIBLE, Rows, advance, dot, expand, times, whole_lanes
+from experiments.propagator import (
+    NEGLIGIBLE,
+    ROUNDING,
+    Rows,
+    Tables,
+    advance,
+    dot,
+    expand,
+    following,
+    state_terms,
+    times,
+    whole_lanes,
+)
 
 Array = NDArray[Any]
 
@@ -30,7 +42,7 @@ COMPLETE, DIVERGED, ENDLESS, CROWDED, EVENTFUL = 0, 1, 2, 3, 4
 
 @njit(cache=True, nogil=True)
 def integrate(
-    unsaturated: Rows, saturated: Rows, increments: Array, polynomials: Array, delays: Array, x0: Array,
+    unsaturated: Rows, saturated: Rows, tables: Tables, delays: Array, x0: Array,
     reset_times: Array, resets: Array, low: float, high: float, horizon: float, step: float, samples: Array,
     groups: Array, most_steps: int, most_events: int, room: int,
 ) -> tuple[Array, Array, Array, int, float, int, float]:  # fmt: skip
@@ -43,8 +55,8 @@ def integrate(
         [Z 0 0], and o rows [. 0 0] of what is watched.
     saturated
         The same with n rows [A B D].
-    increments, polynomials
-        Tables of the two, see :func:`experiments.propagator.tabulate`: shapes (2, n, c), (2, (1 + k + o)(d + 1), c).
+    tables
+        Of the two, see :class:`experiments.propagator.Tables`, for the signals u, Z x and what is watched.
     delays, x0
         Shapes (k,), (n,); delays positive.
     reset_times, resets
@@ -67,6 +79,7 @@ def integrate(
         steps; the largest last term of a signal's polynomial, as a share of the largest that the signal was.
     """
     n, k = len(x0), len(delays)
+    increments, polynomials = tables.increments, tables.polynomials
     indptr, indices, data = unsaturated
     signals = len(indptr) - 1 - n
     most = polynomials.shape[1] // signals - 1
@@ -81,6 +94,7 @@ def integrate(
     queue, queued = np.empty(room), 0  # mesh points to come: the images of kinks
 
     z, P, W = np.zeros(increments.shape[2]), np.zeros((1 + k, most + 1)), np.zeros(most + 1)
+    sizes, terms, later, negligible = np.zeros(len(z)), np.zeros(n), np.zeros(n), np.zeros(1 + k)
     work = np.zeros((2, most + 1))
     U, V = P[0], np.zeros((most + 1, n + 1 + k))
     V[0, :n] = x0
@@ -98,7 +112,7 @@ def integrate(
             for o in range(groups[g], groups[g + 1]):
                 values[1 + o, sample[g]] = times(indptr, indices, data, n + 1 + k + o, V, 0)
             sample[g] += 1
-    t, late, reset, status, steps = 0.0, 0.0, 0, COMPLETE, 0  # the time is t + late: thousands of steps do not drift
+    t, late, reset, status, steps, usual = 0.0, 0.0, 0, COMPLETE, 0, 0  # the time is t + late, lest it drifts
 
     while t < horizon:
         if steps == most_steps:
@@ -146,22 +160,35 @@ def integrate(
             z[r] = x[r]
         z[n] = 0.0 if mode == 0 else (high if mode == 1 else low)
         columns = whole_lanes(n + 1 + k * (known + 1))
+        for i in range(columns):
+            sizes[i] = abs(z[i])
+        for s in range(1 + k):
+            negligible[s] = ROUNDING * dot(tables.magnitudes, which, s, sizes, columns)
         quiet, power, radius = 0, 1.0, min(1.0, (t_next - t) / step + BEYOND)
         for degree in range(most + 1):
             small = degree > known
             upto = columns if small else whole_lanes(n + 1 + k * (degree + 1))  # of the causes of this degree
             for s in range(1 + k):
                 c = dot(polynomials, which, signals * degree + s, z, upto)
-                size[s] = max(size[s], abs(c)) if degree == 0 else size[s]
+                if degree == 0:
+                    size[s] = max(size[s], abs(c))
+                    negligible[s] = max(NEGLIGIBLE * size[s], negligible[s])
                 P[s, degree] = c if abs(c) > NOTHING * size[s] else 0.0
-                small = small and abs(c) * power <= NEGLIGIBLE * size[s]
-            power *= radius
+                small = small and abs(c) * power <= negligible[s]
             quiet = quiet + 1 if small else 0
-            if quiet == 2:
-                break
-        if quiet == 0:
+            if quiet > 1 and degree >= usual - 1:  # what follows may be negligible; most steps end as the last one did
+                state_terms(tables, which, degree, z, columns, terms)
+                for s in range(1 + k):
+                    small = small and following(tables, which, s, degree, terms) * power <= negligible[s]
+                if small:
+                    break
+            power *= radius
+        usual = degree
+        if degree == most:  # what the tables leave out is below rounding, unless delayed signals have such terms
+            terms[:] = 0.0
             for s in range(1 + k):
-                last[s] = max(last[s], abs(P[s, most]) * power)
+                if abs(P[s, most]) * power > negligible[s]:
+                    last[s] = max(last[s], abs(P[s, most]) * power)
 
         whole = abs(t_next - t - step) <= 1e-15 * (step + t)
         if reset < len(reset_times) and t_next == reset_times[reset]:
@@ -209,7 +236,10 @@ def integrate(
                     for i in range(degree + 1):
                         W[i] = U[i]
                 else:
-                    top = expand(polynomials, which, 1 + k + o, signals, z, columns, known, most, seen, o, W)
+                    watched = 1 + k + o
+                    top = expand(
+                        tables, which, watched, signals, z, sizes, columns, degree, most, terms, later, seen, o, W
+                    )
                 for at in range(begin, until):
                     tau, value = (samples[g, at] - t - late) / step, 0.0
                     for i in range(top, -1, -1):
@@ -231,7 +261,8 @@ def integrate(
                     top -= 1
                     power /= reach
                 driven = max(driven, top)
-            advance(unsaturated if mode == 0 else saturated, V, n, driven, most, scale, step, reach, x)
+            rows = unsaturated if mode == 0 else saturated
+            advance(rows, tables.influence[which, signals:], V, n, driven, most, scale, step, reach, x)
             V[: known + 1, n + 1 :] = 0.0
         for r in range(n):
             scale[r] = max(scale[r], abs(x[r]))

@@ -35,7 +35,8 @@ def test_a_tabulated_step_is_the_matrix_exponential_and_the_integral(seed: int) 
     random = np.random.default_rng(100 + seed)
     x0, m, w = random.standard_normal(n), 0.7, random.standard_normal((4, k))
     rows = compressed(np.vstack([np.hstack([A, B[:, None], D]), signals]))
-    increments, polynomials, degree = tabulate(rows, n, k, STEP)
+    tables, degree = tabulate(rows, n, k, STEP)
+    increments, polynomials = tables.increments, tables.polynomials
     z = z_of(x0, m, w, increments.shape[1])
 
     def right_side(t: float, x: np.ndarray) -> np.ndarray:
@@ -62,26 +63,28 @@ def test_a_cut_step_is_the_tabulated_one_of_its_length(reach: float) -> None:
     random = np.random.default_rng(8)
     x0, m, w = random.standard_normal(n), -0.4, random.standard_normal((3, k))
     rows = compressed(np.vstack([np.hstack([A, B[:, None], D]), signals]))
-    shorter, _, _ = tabulate(rows, n, k, reach * STEP)
+    influence = tabulate(rows, n, k, STEP)[0].influence[len(signals) :]
+    shorter = tabulate(rows, n, k, reach * STEP)[0].increments
     scaled = w * reach ** np.arange(3)[:, None]
     V, x = np.zeros((41, n + 1 + k)), np.zeros(n)
     V[0, :n], V[0, n] = x0, m
     V[:3, n + 1 :] = w
-    advance(rows, V, n, 2, 40, np.ones(n), STEP, reach, x)
+    advance(rows, influence, V, n, 2, 40, np.ones(n), STEP, reach, x)
     np.testing.assert_allclose(x, x0 + shorter @ z_of(x0, m, scaled, shorter.shape[1]), rtol=0, atol=1e-12)
 
 
 def test_integrators_that_only_delayed_signals_drive_are_tabulated_to_a_high_degree() -> None:
     # x' = w has no response of its own beyond degree one, yet w may be of any degree
     rows = compressed(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]))
-    increments, _, degree = tabulate(rows, 1, 1, 2.0)
+    tables, degree = tabulate(rows, 1, 1, 2.0)
+    increments = tables.increments
     assert degree >= 20
     # the last one's integral is of one degree more, which the table ends before
     np.testing.assert_allclose(increments[0, 2:-1], 2.0 / np.arange(1, degree + 1), rtol=1e-15)
 
 
 def test_a_series_that_does_not_end_is_said() -> None:
-    assert tabulate(compressed(np.array([[-300.0, 1.0]])), 1, 0, 1.0)[2] == -1
+    assert tabulate(compressed(np.array([[-300.0, 1.0]])), 1, 0, 1.0)[1] == -1
 
 
 @pytest.mark.parametrize("delta", [-0.4, 1e-9, 0.9])
