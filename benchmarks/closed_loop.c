@@ -319,7 +319,7 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
                 int before = pieces ? degrees[left] : 0;
                 double moved = pieces ? (t - starts[left] + (late - lates[left])) / step : 0.0;
                 memcpy(W, pieces ? PIECE(left, j) : rest + j, (before + 1) * sizeof *W);
-                if (gap(W, before, moved, P[1 + j], degree) > NEGLIGIBLE * size[1 + j])
+                if (gap(W, before, moved, P[1 + j], degree) > negligible[1 + j])
                     queued = insert(queue, queued, t + delays[j], 1e-13 * (step + t));
             }
             kink = 0;

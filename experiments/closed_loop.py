@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments import taylor
-from experiments.compiled_loop import CompiledLoop, compile_loop
+from experiments.compiled_loop import BRIEF, CompiledLoop, compile_loop
 from experiments.saturated_loop import SaturatedLoop
 from identification.files import InputError
 
@@ -85,7 +85,7 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
         raise InputError("the sample times are not increasing finite numbers from zero on that end after zero")
     compiled = compile_loop(loop)
     horizon = float(time_s[-1])
-    most_events, room = 4096, _room(compiled)
+    most_events, room, brief = 4096, _room(compiled), BRIEF
     while True:
         if room * compiled.tables.increments.shape[2] > MOST_ROOM:
             raise InputError(
@@ -103,6 +103,7 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
             compiled.saturated,
             compiled.tables,
             compiled.delays,
+            compiled.brief,
             compiled.x0,
             loop.resets.times_s,
             loop.resets.values,
@@ -120,8 +121,9 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
             room *= 2
         elif status == taylor.EVENTFUL:
             most_events *= 8
-        elif status == taylor.COMPLETE and tail > TAIL:
-            compiled = compile_loop(loop, step / 2)
+        elif status == taylor.UNSETTLED or (status == taylor.COMPLETE and tail > TAIL):
+            brief = 0.0 if status == taylor.UNSETTLED else brief
+            compiled = compile_loop(loop, step / 2, brief)
             room = max(room, _room(compiled))
         else:
             break

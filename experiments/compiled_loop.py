@@ -11,6 +11,7 @@ from experiments.propagator import Rows, Tables, compressed, tabulate, whole_lan
 from experiments.saturated_loop import SaturatedLoop
 
 FURTHEST = 4.0  # fastest root times step: the terms of a series grow to exp of it, and two digits are lost
+BRIEF = 0.01  # a dead time shorter than so much of the fastest root's time constant is no longer than a step
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,7 @@ class CompiledLoop:
 
     Parameters
     ----------
-    unsaturated, saturated, tables, delays, x0, step, groups
+    unsaturated, saturated, tables, delays, brief, x0, step, groups
         As there.
     lags
         Shape (g,): how much earlier each group is sampled, in seconds; zero first.
@@ -31,6 +32,7 @@ class CompiledLoop:
     saturated: Rows
     tables: Tables
     delays: np.ndarray
+    brief: np.ndarray
     x0: np.ndarray
     step: float
     groups: np.ndarray
@@ -38,15 +40,19 @@ class CompiledLoop:
     reading: np.ndarray
 
 
-def compile_loop(loop: SaturatedLoop, most_step: float = np.inf) -> CompiledLoop:
+def compile_loop(loop: SaturatedLoop, most_step: float = np.inf, most_brief: float = BRIEF) -> CompiledLoop:
     """Merge the delayed signals that enter the loop alike, choose the step, and tabulate it.
 
-    The step is set by the fastest eigenvalue of the loop, saturated or not, and by the shortest dead time, of which it
-    is a whole part: then most delayed polynomials are read where they start. It is halved until all series end.
+    The step is set by the fastest eigenvalue of the loop, saturated or not, and by the shortest dead time that is not
+    brief, of which it is a whole part: then most delayed polynomials are read where they start. It is halved until all
+    series end. A dead time is brief up to ``most_brief`` time constants of the fastest eigenvalue: the loop is taken
+    without it, and what it changes is found in each step.
     """
     now = loop.delays == 0
     A, C = loop.A + loop.D[:, now] @ loop.Z[now], loop.C + loop.E[now] @ loop.Z[now]
     D, E, Z, delays = _merged(loop)
+    brief = delays * max(_fastest(A, loop.B, C), _fastest(A + D @ Z, loop.B, C + E @ Z)) <= most_brief
+    A, C = A + D[:, brief] @ Z[brief], C + E[brief] @ Z[brief]
     n, k = len(loop.x0), len(delays)
     watched, groups, lags, reading = _watched(loop)
     # what u - sat(u) drives is driven by zeros in the loop without saturation, and not by rounding
@@ -56,10 +62,10 @@ def compile_loop(loop: SaturatedLoop, most_step: float = np.inf) -> CompiledLoop
     unsaturated = compressed(np.vstack([np.hstack([free_A, np.zeros((n, 1)), free_D]), *read]))
     saturated = compressed(np.vstack([np.hstack([A, loop.B[:, None], D]), *read]))
 
-    fastest = max(np.abs(np.linalg.eigvals(matrix)).max() for matrix in (A, free_A))
+    fastest = _fastest(A, loop.B, C)
     step = min(FURTHEST / fastest if fastest > 0 else np.inf, most_step)
-    if k:
-        shortest = float(delays.min())
+    if not brief.all():
+        shortest = float(delays[~brief].min())
         step = shortest / max(np.ceil(shortest / step), 1.0)
     elif np.isinf(step):
         step = 1.0  # of integrators alone, whose series end by themselves
@@ -73,12 +79,18 @@ def compile_loop(loop: SaturatedLoop, most_step: float = np.inf) -> CompiledLoop
         saturated=saturated,
         tables=Tables(*(_stacked(pair) for pair in zip(*(tables for tables, _ in both), strict=True))),
         delays=delays,
+        brief=brief,
         x0=loop.x0,
         step=step,
         groups=groups,
         lags=lags,
         reading=reading,
     )
+
+
+def _fastest(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> float:
+    """The largest modulus of an eigenvalue of the loop, saturated (A) or not (A + B C), in rad/s."""
+    return max(float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in (A, A + np.outer(B, C)))
 
 
 def _merged(loop: SaturatedLoop) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -51,8 +51,10 @@ def insert(queue: Array, queued: int, t: float, near: float) -> int:
 
 
 @njit(cache=True, nogil=True)
-def gap(left: Array, left_degree: int, moved: float, right: Array, right_degree: int, work: Array) -> float:
-    """The most that two polynomials differ within half a step of where the right one starts.
+def gap(
+    left: Array, left_degree: int, moved: float, right: Array, right_degree: int, radius: float, work: Array
+) -> float:
+    """The most that two polynomials differ within ``radius`` steps of where the right one starts.
 
     ``left`` starts ``moved`` steps before; it is changed.
     """
@@ -63,5 +65,5 @@ def gap(left: Array, left_degree: int, moved: float, right: Array, right_degree:
         if i <= right_degree:
             difference -= right[i]
         most += abs(difference) * power
-        power *= 0.5
+        power *= radius
     return most

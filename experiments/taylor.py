@@ -35,14 +35,82 @@ Array = NDArray[Any]
 
 NOTHING = 1e-30  # what is smaller than this share of the largest value of its signal so far is zero
 BEYOND = 0.5  # of a step: how far beyond its end, where no kink is, the polynomial of a cut step is read
+TRIALS = 30  # in which what brief dead times change settles,
+SETTLED = 4.0  # of what is negligible, when it moves by no more than that
 DIVERGENT = 1e100  # a loop whose state passes this diverges
 
-COMPLETE, DIVERGED, ENDLESS, CROWDED, EVENTFUL = 0, 1, 2, 3, 4
+COMPLETE, DIVERGED, ENDLESS, CROWDED, EVENTFUL, UNSETTLED = 0, 1, 2, 3, 4, 5
+
+
+@njit(cache=True, nogil=True)
+def fill(z: Array, n: int, k: int, j: int, c: Array, degree: int, radius: float, negligible: float) -> int:
+    """Put a delayed signal's coefficients into z but for the last, negligible ones; the degree that is left."""
+    power = radius**degree
+    while degree > 0 and abs(c[degree]) * power <= negligible:
+        degree -= 1
+        power /= radius
+    for i in range(degree + 1):
+        z[n + 1 + k * i + j] = c[i]
+    return degree
+
+
+@njit(cache=True, nogil=True)
+def unfold(
+    tables: Tables, which: int, k: int, z: Array, sizes: Array, known: int, radius: float, usual: int, size: Array,
+    negligible: Array, P: Array, terms: Array,
+) -> tuple[int, float]:  # fmt: skip
+    """Fill P (1 + k, most + 1) with the coefficients of u and Z x until all that follow are negligible up to a radius.
+
+    Parameters
+    ----------
+    tables, which
+        Of both modes, and the mode's.
+    z, known, radius
+        What the step begins with, the highest degree of a delayed signal in it, and how many steps far the polynomials
+        are read.
+    usual
+        The last step's degree, below which the end is not looked for.
+    sizes, size, negligible, terms
+        Filled with abs(z), the largest values of the signals so far, what is negligible beside them, and the absolute
+        values of x's coefficients of the last degree.
+
+    Returns
+    -------
+    degree, power
+        Of the last coefficient, and radius to that power.
+    """
+    n, signals, most = len(terms), tables.magnitudes.shape[1], P.shape[1] - 1
+    columns = whole_lanes(n + 1 + k * (known + 1))
+    for i in range(columns):
+        sizes[i] = abs(z[i])
+    for s in range(1 + k):
+        negligible[s] = ROUNDING * dot(tables.magnitudes, which, s, sizes, columns)
+    quiet, power = 0, 1.0
+    for degree in range(most + 1):
+        small = degree > known
+        upto = columns if small else whole_lanes(n + 1 + k * (degree + 1))  # of the causes of this degree
+        for s in range(1 + k):
+            c = dot(tables.polynomials, which, signals * degree + s, z, upto)
+            if degree == 0:
+                size[s] = max(size[s], abs(c))
+                negligible[s] = max(NEGLIGIBLE * size[s], negligible[s])
+            P[s, degree] = c if abs(c) > NOTHING * size[s] else 0.0
+            small = small and abs(c) * power <= negligible[s]
+        quiet = quiet + 1 if small else 0
+        if quiet > 1 and degree >= usual - 1:  # what follows may be negligible; most steps end as the last one did
+            state_terms(tables, which, degree, z, columns, terms)
+            for s in range(1 + k):
+                small = small and following(tables, which, s, degree, terms) * power <= negligible[s]
+            if small:
+                return degree, power
+        power *= radius
+    terms[:] = 0.0  # what the tables leave out is below rounding
+    return most, power / radius
 
 
 @njit(cache=True, nogil=True)
 def integrate(
-    unsaturated: Rows, saturated: Rows, tables: Tables, delays: Array, x0: Array,
+    unsaturated: Rows, saturated: Rows, tables: Tables, delays: Array, brief: Array, x0: Array,
     reset_times: Array, resets: Array, low: float, high: float, horizon: float, step: float, samples: Array,
     groups: Array, most_steps: int, most_events: int, room: int,
 ) -> tuple[Array, Array, Array, int, float, int, float]:  # fmt: skip
@@ -57,14 +125,15 @@ def integrate(
         The same with n rows [A B D].
     tables
         Of the two, see :class:`experiments.propagator.Tables`, for the signals u, Z x and what is watched.
-    delays, x0
-        Shapes (k,), (n,); delays positive.
+    delays, brief, x0
+        Shapes (k,), (k,), (n,); delays positive. Where ``brief``, the loop is that with a dead time of zero, and w_j
+        stands for what the dead time changes, Z_j x(t - h_j) - Z_j x(t).
     reset_times, resets
         Shapes (b,), (b, g): times at which the first g states take given values.
     low, high
         Saturation limits, may be infinite.
     horizon, step
-        End time and the tables' step in seconds, step <= min(delays).
+        End time and the tables' step in seconds, not more than any dead time that is not brief.
     samples, groups
         Shapes (g, s), (g + 1,): groups[i] ... groups[i + 1] - 1 of what is watched is sampled at the sorted times
         samples[i] <= horizon; before zero it is as at zero. u is sampled with the first group.
@@ -75,8 +144,9 @@ def integrate(
     -------
     values (1 + o, s), events (e,), modes (e,), status, end, steps, tail
         u and what is watched at the samples; event times with the mode entered (-1, 0, 1); COMPLETE, DIVERGED,
-        ENDLESS (too many steps), CROWDED (too little room) or EVENTFUL; the time reached; the number of
-        steps; the largest last term of a signal's polynomial, as a share of the largest that the signal was.
+        ENDLESS (too many steps), CROWDED (too little room), EVENTFUL or UNSETTLED (a brief dead time is too long);
+        the time reached; the number of steps; the largest last term of a signal's polynomial, as a share of the
+        largest that the signal was.
     """
     n, k = len(x0), len(delays)
     increments, polynomials = tables.increments, tables.polynomials
@@ -92,6 +162,10 @@ def integrate(
     wrap = room - 1
     cursor, filled = np.zeros(k, np.int64), np.zeros(k, np.int64)
     queue, queued = np.empty(room), 0  # mesh points to come: the images of kinks
+    fresh, past = (
+        np.zeros(k),
+        np.zeros((k, most + 1)),
+    )  # until when a brief dead time reaches back beyond a kink, and to what
 
     z, P, W = np.zeros(increments.shape[2]), np.zeros((1 + k, most + 1)), np.zeros(most + 1)
     sizes, terms, later, negligible = np.zeros(len(z)), np.zeros(n), np.zeros(n), np.zeros(1 + k)
@@ -99,7 +173,7 @@ def integrate(
     U, V = P[0], np.zeros((most + 1, n + 1 + k))
     V[0, :n] = x0
     rest = np.array([times(indptr, indices, data, n + 1 + j, V, 0) for j in range(k)])
-    V[0, n + 1 :] = rest
+    V[0, n + 1 :] = np.where(brief, 0.0, rest)
     x, scale, size = x0.copy(), np.abs(x0), np.zeros(1 + k)
     size[1:] = np.abs(rest)
     last = np.zeros(1 + k)
@@ -125,6 +199,11 @@ def integrate(
         if reset < len(reset_times) and reset_times[reset] < t_next:
             t_next = reset_times[reset]
 
+        for j in range(k):
+            if brief[j] and kink and delays[j] > 1e-13 * (step + t):
+                fresh[j] = t + delays[j]
+            if brief[j] and t < fresh[j]:
+                t_next = min(t_next, fresh[j])
         known = 0
         for j in range(k):
             for i in range(filled[j] + 1):
@@ -132,60 +211,67 @@ def integrate(
             filled[j] = 0
             start = t - delays[j]
             middle = start + 0.5 * (t_next - t)  # decides the piece: the ends may lie on a kink
-            if middle < 0:
-                z[n + 1 + j] = rest[j]
-                continue
             while cursor[j] + 1 < pieces and starts[(cursor[j] + 1) & wrap] <= middle:
                 cursor[j] += 1
-            piece = cursor[j] & wrap
-            if starts[piece] + radii[piece] * step + delays[j] < t_next - 1e-9 * step:
-                t_next = starts[piece] + radii[piece] * step + delays[j]
-            radius = min(1.0, (t_next - t) / step + BEYOND)
-            degree = degrees[piece]
-            for i in range(degree + 1):
-                W[i] = history[piece, j, i]
-            moved = start - starts[piece] + (late - lates[piece])
-            if abs(moved) > 4e-16 * (step + t):  # else the same time, to rounding
-                shift(W, degree, moved / step, work)
-            power = radius**degree
-            while degree > 0 and abs(W[degree]) * power <= NEGLIGIBLE * size[1 + j]:
-                degree -= 1
-                power /= radius
-            for i in range(degree + 1):
-                z[n + 1 + k * i + j] = W[i]
-            known, filled[j] = max(known, degree), degree
+            if brief[j] and t >= fresh[j]:
+                continue
+            W[:] = 0.0
+            if middle < 0:
+                W[0], degree = rest[j], 0
+            else:
+                piece = cursor[j] & wrap
+                if starts[piece] + radii[piece] * step + delays[j] < t_next - 1e-9 * step:
+                    t_next = starts[piece] + radii[piece] * step + delays[j]
+                degree = degrees[piece]
+                for i in range(degree + 1):
+                    W[i] = history[piece, j, i]
+                moved = start - starts[piece] + (late - lates[piece])
+                if abs(moved) > 4e-16 * (step + t):  # else the same time, to rounding
+                    shift(W, degree, moved / step, work)
+            if brief[j]:
+                past[j] = W
+                continue
+            filled[j] = fill(z, n, k, j, W, degree, min(1.0, (t_next - t) / step + BEYOND), NEGLIGIBLE * size[1 + j])
+            known = max(known, filled[j])
 
         which = 0 if mode == 0 else 1
         for r in range(n):
             z[r] = x[r]
         z[n] = 0.0 if mode == 0 else (high if mode == 1 else low)
+        radius = min(1.0, (t_next - t) / step + BEYOND)
+        degree, power = unfold(tables, which, k, z, sizes, known, radius, usual, size, negligible, P, terms)
+        for trial in range(TRIALS if brief.any() else 0):
+            settled, most_known = True, 0
+            for j in range(k):
+                if not brief[j]:
+                    most_known = max(most_known, filled[j])
+                    continue
+                for i in range(most + 1):
+                    W[i] = (P[1 + j, i] if i <= degree else 0.0) if t >= fresh[j] else past[j, i]
+                if t >= fresh[j]:
+                    shift(W, degree, -delays[j] / step, work)
+                for i in range(degree + 1):
+                    W[i] -= P[1 + j, i]
+                for i in range(most + 1):
+                    work[0, i], z[n + 1 + k * i + j] = z[n + 1 + k * i + j], 0.0
+                filled[j] = fill(z, n, k, j, W, most, radius, NEGLIGIBLE * size[1 + j])
+                change, reached = 0.0, 1.0
+                for i in range(most + 1):
+                    change += abs(z[n + 1 + k * i + j] - work[0, i]) * reached
+                    reached *= radius
+                settled = settled and change <= SETTLED * negligible[1 + j]
+                most_known = max(most_known, filled[j])
+            known = most_known
+            degree, power = unfold(tables, which, k, z, sizes, known, radius, usual, size, negligible, P, terms)
+            if settled:
+                break
+            if trial == TRIALS - 1:
+                status = UNSETTLED
+        if status == UNSETTLED:
+            break
         columns = whole_lanes(n + 1 + k * (known + 1))
-        for i in range(columns):
-            sizes[i] = abs(z[i])
-        for s in range(1 + k):
-            negligible[s] = ROUNDING * dot(tables.magnitudes, which, s, sizes, columns)
-        quiet, power, radius = 0, 1.0, min(1.0, (t_next - t) / step + BEYOND)
-        for degree in range(most + 1):
-            small = degree > known
-            upto = columns if small else whole_lanes(n + 1 + k * (degree + 1))  # of the causes of this degree
-            for s in range(1 + k):
-                c = dot(polynomials, which, signals * degree + s, z, upto)
-                if degree == 0:
-                    size[s] = max(size[s], abs(c))
-                    negligible[s] = max(NEGLIGIBLE * size[s], negligible[s])
-                P[s, degree] = c if abs(c) > NOTHING * size[s] else 0.0
-                small = small and abs(c) * power <= negligible[s]
-            quiet = quiet + 1 if small else 0
-            if quiet > 1 and degree >= usual - 1:  # what follows may be negligible; most steps end as the last one did
-                state_terms(tables, which, degree, z, columns, terms)
-                for s in range(1 + k):
-                    small = small and following(tables, which, s, degree, terms) * power <= negligible[s]
-                if small:
-                    break
-            power *= radius
         usual = degree
-        if degree == most:  # what the tables leave out is below rounding, unless delayed signals have such terms
-            terms[:] = 0.0
+        if degree == most:  # a delayed signal may have terms beyond
             for s in range(1 + k):
                 if abs(P[s, most]) * power > negligible[s]:
                     last[s] = max(last[s], abs(P[s, most]) * power)
@@ -218,7 +304,8 @@ def integrate(
                         before, moved = degrees[left], (t - starts[left] + (late - lates[left])) / step
                         for i in range(before + 1):
                             W[i] = history[left, j, i]
-                    if gap(W, before, moved, history[piece, j], degree, work) > NEGLIGIBLE * size[1 + j]:
+                    read = delays[j] / step if brief[j] else BEYOND
+                    if gap(W, before, moved, history[piece, j], degree, read, work) > negligible[1 + j]:
                         queued = insert(queue, queued, t + delays[j], 1e-13 * (step + t))
                 kink = False
             pieces += 1

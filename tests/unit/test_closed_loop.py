@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from oracle import reference_run
 
 from design.contract import Design
@@ -194,8 +197,8 @@ def test_resets_that_cannot_be_are_refused(times: list[float], message: str) -> 
 
 
 def test_dead_times_too_far_apart_are_refused() -> None:
-    # one of 1e-6 s makes the steps, one of 1e3 s would remember 1e9 of them
-    pair = {"D": np.zeros((1, 2)), "E": np.array([-0.1, -0.1]), "Z": np.ones((2, 1)), "delays": np.array([1e-6, 1e3])}
+    # one of 0.02 s makes the steps, one of 1e8 s would remember 5e9 of them
+    pair = {"D": np.zeros((1, 2)), "E": np.array([-0.1, -0.1]), "Z": np.ones((2, 1)), "delays": np.array([0.02, 1e8])}
     loop = dataclasses.replace(scalar_loop(0.0, 1.0, 0.1, 1.0), outputs={}, **pair)
     with pytest.raises(InputError, match="too many steps to remember"):
         simulate(loop, FREE, np.array([0.0, 1.0]))
@@ -209,3 +212,31 @@ def test_the_unit_of_time_does_not_matter(unit: float) -> None:
     run, other = (simulate(one, (-0.5, 0.3), times) for one, times in ((loop, t), (scaled, t * unit)))
     np.testing.assert_allclose(other.outputs["x"], run.outputs["x"], rtol=0, atol=1e-13)
     np.testing.assert_allclose(other.events_s, run.events_s * unit, rtol=1e-12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(exponent=st.floats(-13.0, math.log10(0.009)), unit=st.integers(-9, 9), horizon=st.floats(0.5, 30.0))
+def test_a_brief_dead_time_is_exact_without_steps_as_short_as_it(exponent: float, unit: int, horizon: float) -> None:
+    """x' = -x(t - h): of its modes exp(s t), s + exp(-s h) = 0, all but the slowest are over after some dead times."""
+    scale, h = 10.0**unit, 10.0**exponent
+    slow = -1.0
+    for _ in range(50):
+        slow -= (slow + math.exp(-slow * h)) / (1 - h * math.exp(-slow * h))
+    t = np.linspace(max(40 * h, 0.3), max(40 * h, 0.3) + horizon, 23)
+    run = simulate(scalar_loop(0.0, 1 / scale, h * scale, 1.0), FREE, t * scale)
+    np.testing.assert_allclose(run.outputs["x"], np.exp(slow * t) / (-slow * (1 + h * slow)), rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("h", [1e-3, 1e-5, 1e-7, 1e-10])
+def test_a_brief_dead_time_behind_a_saturation(h: float) -> None:
+    # as test_saturated_integrator_switches_where_the_closed_form_says, and then the mode of the loop with its past
+    slow = -1.0
+    for _ in range(50):
+        slow -= (slow + math.exp(-slow * h)) / (1 - h * math.exp(-slow * h))
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    theta = h / 2 * (nodes - 1)  # before the switch, when x was 1 - h - theta
+    start = 1 - h - (h / 2 * weights) @ ((1 - h - theta) * np.exp(-slow * (theta + h)))
+    t = np.linspace(0.5, 8, 16)
+    run = simulate(scalar_loop(0.0, 1.0, h, 3.0), (-1.0, 1.0), np.append(2 + h, 2 + h + t))
+    assert run.events_s[0] == pytest.approx(2 + h, abs=1e-13)
+    np.testing.assert_allclose(run.outputs["x"][1:], start / (1 + h * slow) * np.exp(slow * t), rtol=0, atol=1e-13)

@@ -155,3 +155,23 @@ def test_the_first_steps_are_those_of_collocation(name: str, reference: str, lim
         run = simulate(loop, (-limit, limit), time_s)
         for found, wanted in [(run.control, control), (run.outputs["output"], outputs["output"])]:
             assert np.abs(found - wanted).max() <= 1e-9 * np.abs(wanted).max() + 1e-300
+
+
+@pytest.mark.parametrize("kind", ["none", "thesis", "corrected"])
+def test_a_brief_dead_time_in_a_loop_that_saturates_at_once(kind: str) -> None:
+    implied = read_model("implied")
+    plant = dataclasses.replace(implied.plant, delay_s=1e-5)  # 1 % of its fastest time constant
+    design = design_extended(dataclasses.replace(implied, plant=plant), [1.5], 4.0, [(2.0, 1.0)])
+    anti_windup = None if kind == "none" else design.compensator(kind)
+    loop = design_loop(design, REFERENCES["cosine"], anti_windup)
+    assert compile_loop(loop).brief.all()
+    time_s = np.linspace(0.0, 0.012, 25)
+    limit = float(np.abs(simulate(loop, FREE, time_s).control).max()) / 2
+    control, outputs, events_s, _ = collocated_run(loop, (-limit, limit), time_s)
+    run = simulate(loop, (-limit, limit), time_s)
+    assert len(events_s) > 0
+    np.testing.assert_allclose(run.events_s, events_s, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(run.control, control, rtol=0, atol=1e-11 * np.abs(control).max())
+    np.testing.assert_allclose(
+        run.outputs["output"], outputs["output"], rtol=0, atol=1e-11 * np.abs(outputs["output"]).max()
+    )

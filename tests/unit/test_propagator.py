@@ -100,9 +100,9 @@ def test_a_shifted_polynomial_is_the_same_polynomial(delta: float) -> None:
 
 def test_the_gap_is_the_difference_half_a_step_around() -> None:
     left, right = np.array([1.0, 2.0, 0.5]), np.array([1.0 + 2 * 0.2 + 0.5 * 0.04, 2.0 + 0.2, 0.5])
-    assert gap(left.copy(), 2, 0.2, right, 2, np.zeros((2, 3))) < 1e-15
+    assert gap(left.copy(), 2, 0.2, right, 2, 0.5, np.zeros((2, 3))) < 1e-15
     right[1] += 1e-6  # a kink
-    assert gap(left.copy(), 2, 0.2, right, 2, np.zeros((2, 3))) == pytest.approx(0.5e-6)
+    assert gap(left.copy(), 2, 0.2, right, 2, 0.5, np.zeros((2, 3))) == pytest.approx(0.5e-6)
 
 
 def test_the_queue_is_sorted_and_holds_a_time_once() -> None:
