@@ -12,12 +12,11 @@ from design.contract import Design
 from design.corrected import SETTLED
 from design.internal_model import internal_model, reference_polynomial
 from design.judgement import SECTOR, compensators
-from design.mixed_sensitivity import SynthesisError, mixed_sensitivity
+from design.mixed_sensitivity import mixed_sensitivity
 from identification.files import InputError
 from identification.model import IdentifiedModel
 
 TRACKING = 0.01  # W1 asks for |S| below gamma times this at the reference's frequencies
-FACTORS = (1, 2, 4, 8, 16, 32, 0.5, 0.25)  # of the decay rate, in turn while the synthesis fails its own check
 
 
 def design_delay_free(
@@ -59,8 +58,7 @@ def design_delay_free(
 
     W1 has the reference's poles, damped: moved left by twice the decay rate, which makes the stabiliser's
     zeros there cancel, and W1(0) = 1/TRACKING. The decay rate leaves SETTLED of a transient after one period,
-    or is half that of the slowest mode of plant and bound where these decay more slowly. Where the reference is
-    slower than the plant by many decades the arithmetic may fail its own check; then other decay rates are tried.
+    or is half that of the slowest mode of plant and bound where these decay more slowly.
 
     C = K A/Lambda has a zero at the plant's pole s = 0 (A(0) = 0; Lemma 1 assumes a stable A): the integrator is
     hidden from the loop and not stabilised, so that a constant disturbance at the plant's input makes y drift.
@@ -73,26 +71,15 @@ def design_delay_free(
     units = internal_model(plant, omega, epsilon)
     A, B, W_a = plant_denominator(plant), plant_numerator(plant), bound_block(model.additive_bound)
     slowest = min(-root.real for root in A.zeros + B.zeros + W_a.poles if root != 0)
-    wanted = min(math.log(1 / SETTLED) / period_s, slowest / 2)
+    decay_rate = min(math.log(1 / SETTLED) / period_s, slowest / 2)
 
     fastest = max(abs(root) for root in A.zeros + B.zeros + W_a.poles + units.Lambda.zeros)
     W2 = W_a * A * B.inverse()
     missing = (W2 * units.G_A).relative_degree
     W2 = W2 * Block((2 * fastest) ** -missing, (complex(-2 * fastest),) * missing)
-    tried: list[float] = []
-    for factor in FACTORS:
-        decay_rate = min(wanted * factor, slowest / 2)
-        if decay_rate in tried:
-            continue
-        tried.append(decay_rate)
-        damped = tuple(root - 2 * decay_rate for root in reference_polynomial(omega, epsilon).zeros)
-        W1 = Block(float(np.prod(np.abs(damped))) / TRACKING, (), damped)
-        try:
-            synthesis = mixed_sensitivity(units.G_A, W1, W2, decay_rate)
-            break
-        except SynthesisError:
-            if factor == FACTORS[-1]:
-                raise
+    damped = tuple(root - 2 * decay_rate for root in reference_polynomial(omega, epsilon).zeros)
+    W1 = Block(float(np.prod(np.abs(damped))) / TRACKING, (), damped)
+    synthesis = mixed_sensitivity(units.G_A, W1, W2, decay_rate)
     if recovery_s is None:
         recovery_s = math.log(1 / SETTLED) / (2 * decay_rate)
     anti_windup = compensators(model, recovery_s, sector, bandwidth)
