@@ -11,6 +11,7 @@ import numpy as np
 from design.audit import Audit
 from design.block import bound_block
 from design.contract import Design
+from design.digits import lower_end, upper_end
 from design.mixed_sensitivity import Infimum
 from design.robustness import Margin, Margins
 from identification.plant import PlantModel
@@ -73,19 +74,20 @@ def _plant_in_words(plant: PlantModel) -> str:
 
 
 def _hinf_lines(hinf: Mapping[str, Any], infimum: Infimum | str) -> Iterable[str]:
-    yield f"  of this K                       {hinf['gamma']:.6g}"
+    yield f"  of this K                       {upper_end(hinf['gamma'], 6)} at most"
     if isinstance(infimum, Infimum):
-        yield (
-            f"  infimum of (2.8)                in [{infimum.lower:.6g}, {infimum.upper:.6g}], its upper end by a K "
-            "whose "
-            f"loop decays with {infimum.decay_rate:.3g} 1/s"
-        )
+        ends, decay = _interval(infimum.lower, infimum.upper), lower_end(infimum.decay_rate, 3)
+        yield f"  infimum of (2.8)                in {ends}, its upper end by a K whose loop decays with {decay} 1/s"
         yield f"    no K below                    {infimum.reason}"
     else:
         yield f"  infimum of (2.8)                {infimum}"
-    ends = f"[{hinf['gamma_line_lower']:.6g}, {hinf['gamma_line']:.6g}]"
-    yield f"  with a decay of {hinf['decay_rate']:<15.4g} in {ends} on that line"
+    ends = _interval(hinf["gamma_line_lower"], hinf["gamma_line"])
+    yield f"  with a decay of {lower_end(hinf['decay_rate'], 4):<15s} in {ends} on that line"
     yield f"    no K below                    {hinf.get('line_reason', '')}"
+
+
+def _interval(lower: float, upper: float) -> str:
+    return f"[{lower_end(lower, 6)}, {upper_end(upper, 6)}]"
 
 
 def _covered(delay_s: float) -> str:

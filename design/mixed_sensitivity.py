@@ -163,7 +163,7 @@ def _synthesise(problem: Problem, suboptimality: float) -> tuple[Block, tuple[co
     if slowest >= -decay_rate:
         raise SynthesisError(
             f"K, rounded to doubles, leaves a closed-loop pole at Re s = {slowest:.6g}; expected it left of "
-            f"{0 - decay_rate:.6g}: the roots of G and of the weights lie too many decades apart"
+            f"{0 - decay_rate:.6g}: the roots of G and of the weights lie too many decades apart or too near each other"
         )
     norm = closed_loop_norm(G, W1, W2, K, decay_rate)
     if norm > most:
