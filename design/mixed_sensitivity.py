@@ -106,7 +106,42 @@ def mixed_sensitivity(G: Block, W1: Block, W2: Block, decay_rate: float) -> Synt
 
     Whether a gamma is feasible is decided as :class:`design.pick.Problem` says.
     """
-    K, poles, line_bound, line = _synthesise(Problem(G, W1, W2, decay_rate), SUBOPTIMALITY)
+    problem = Problem(G, W1, W2, decay_rate)
+    K, bound = _synthesise(problem, SUBOPTIMALITY)
+    return _assess(problem, K, bound)
+
+
+def assess(G: Block, W1: Block, W2: Block, K: Block, decay_rate: float) -> Synthesis:
+    """What can be said of any controller: the same as of the one that :func:`mixed_sensitivity` makes.
+
+    Parameters
+    ----------
+    G, W1, W2, decay_rate
+        As for :func:`mixed_sensitivity`.
+    K
+        Controller without dead time.
+
+    Raises
+    ------
+    InputError
+        As :func:`mixed_sensitivity`.
+    SynthesisError
+        A closed-loop pole does not lie left of -decay_rate.
+    """
+    problem = Problem(G, W1, W2, decay_rate)
+    _check(problem)
+    return _assess(problem, K, _bisect(problem))
+
+
+def _assess(problem: Problem, K: Block, line_bound: Obstacle) -> Synthesis:
+    G, W1, W2, decay_rate = problem.G, problem.W1, problem.W2, problem.decay_rate
+    poles = closed_loop_poles(G, K)
+    slowest = max(pole.real for pole in poles)
+    if slowest >= -decay_rate:
+        raise SynthesisError(
+            f"with K a closed-loop pole lies at Re s = {slowest:.6g}; expected all of them left of {0 - decay_rate:.6g}"
+        )
+    line = closed_loop_norm(G, W1, W2, K, decay_rate)
     bound, norm = line_bound, line
     if decay_rate > 0:
         bound, norm = _bisect(Problem(G, W1, W2, 0.0)), closed_loop_norm(G, W1, W2, K)
@@ -131,50 +166,45 @@ def infimum(G: Block, W1: Block, W2: Block, decay_rate: float) -> Infimum:
     InputError, SynthesisError
         As :func:`mixed_sensitivity`, for the given decay rate.
     """
-    if not any(pole.real == 0 for pole in G.poles):
-        _, _, bound, norm = _synthesise(Problem(G, W1, W2, 0.0), SUBOPTIMALITY / 10)
-        return Infimum(bound.gamma, bound.reason, norm, 0.0)
+    on_axis = any(pole.real == 0 for pole in G.poles)
+    reached = decay_rate if on_axis else 0.0
 
-    def upper() -> float:
+    def upper(decay_rate: float) -> float:
         return closed_loop_norm(G, W1, W2, _synthesise(Problem(G, W1, W2, decay_rate), SUBOPTIMALITY / 10)[0])
 
-    best, reached = upper(), decay_rate
-    bound = _bisect(Problem(G, W1, W2, 0.0))
-    while best > (1 + TIGHT) * bound.gamma:
-        decay_rate /= 2
+    best, bound = upper(reached), _bisect(Problem(G, W1, W2, 0.0))
+    while on_axis and best > (1 + TIGHT) * bound.gamma:
         try:
-            best, reached = min(best, upper()), decay_rate
+            best = min(best, upper(reached / 2))
         except SynthesisError:
             break
+        reached /= 2
     return Infimum(bound.gamma, bound.reason, best, reached)
 
 
-def _synthesise(problem: Problem, suboptimality: float) -> tuple[Block, tuple[complex, ...], Obstacle, float]:
-    """The controller, the closed loop's poles, what is proved infeasible on the line, and the norm there."""
-    G, W1, W2, decay_rate = problem.G, problem.W1, problem.W2, problem.decay_rate
-    _check(G, W1, W2, decay_rate)
+def _synthesise(problem: Problem, suboptimality: float) -> tuple[Block, Obstacle]:
+    """The controller, with its own check, and what is proved infeasible on the line."""
+    G, decay_rate = problem.G, problem.decay_rate
+    _check(problem)
     bound = _bisect(problem)
     most = bound.gamma * (1 + suboptimality)
     K = central_controller(problem, most * (1 - ROUNDING * suboptimality))
     if K is None:
-        raise SynthesisError(f"a controller for the norm {most:.6g} is hidden by rounding")
-    poles = closed_loop_poles(G, K)
-    slowest = max(pole.real for pole in poles)
-    if slowest >= -decay_rate:
-        raise SynthesisError(
-            f"K, rounded to doubles, leaves a closed-loop pole at Re s = {slowest:.6g}; expected it left of "
-            f"{0 - decay_rate:.6g}: the roots of G and of the weights lie too many decades apart or too near each other"
-        )
-    norm = closed_loop_norm(G, W1, W2, K, decay_rate)
+        raise SynthesisError(f"rounding hides the controller for the norm {most:.6g}")
+    slowest = max(pole.real for pole in closed_loop_poles(G, K))
+    norm = math.inf if slowest >= -decay_rate else closed_loop_norm(G, problem.W1, problem.W2, K, decay_rate)
     if norm > most:
+        missed = f"the norm {norm:.6g}" if norm < math.inf else f"a closed-loop pole at Re s = {slowest:.4g}"
         raise SynthesisError(
-            f"K, rounded to doubles, reaches the norm {norm:.6g}; expected {most:.6g}: the roots of G and of the "
-            "weights lie too many decades apart"
+            f"no controller brings the norm below {bound.gamma:.6g}, and the one for {most:.6g} whose loop decays with "
+            f"{decay_rate:.4g} 1/s, rounded to doubles, has {missed}; expected a reference, poles and weights that lie "
+            "fewer decades apart and not so near each other"
         )
-    return K, poles, bound, norm
+    return K, bound
 
 
-def _check(G: Block, W1: Block, W2: Block, decay_rate: float) -> None:
+def _check(problem: Problem) -> None:
+    G, W1, W2, decay_rate = problem.G, problem.W1, problem.W2, problem.decay_rate
     if not (math.isfinite(decay_rate) and decay_rate >= 0):
         raise InputError(f"the decay rate is {decay_rate:g}; expected a number of 1/s that is not negative")
     if G.delay_s or G.relative_degree < 0:
