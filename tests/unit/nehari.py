@@ -1,4 +1,4 @@
-"""The optimum of (2.8) by another method, which shares nothing with the Riccati equations: Nehari's theorem by FFT.
+"""The optimum of (2.8) by another method, which shares nothing with Pick's matrix: Nehari's theorem by FFT.
 
 With T = 1 - S the norm is at most gamma where |T - T0| <= R at every frequency,
 
