@@ -238,7 +238,7 @@ def _pick_matrix(points: Sequence[acb], values: Sequence[acb]) -> list[list[acb]
 
 
 def central_controller(problem: Problem, gamma: float) -> Block | None:
-    """The controller of least entropy among those that bring the norm below gamma; None where rounding hides it.
+    """The controller of greatest entropy among those that bring the norm below gamma; None where rounding hides it.
 
     Parameters
     ----------
