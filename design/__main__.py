@@ -16,6 +16,7 @@ from design.audit_text import audit_text
 from design.block import from_polynomial
 from design.contract import Design, read_design
 from design.delay_free import design_delay_free
+from design.digits import lower_end, upper_end
 from design.extended import METHODS, design_extended
 from design.judgement import SECTOR, facts
 from identification.files import CommandGroup, InputError, write_whole
@@ -87,8 +88,9 @@ def delay_free(
         design,
         model,
         output,
-        f"H-infinity stabiliser: ||[W1 S; W2 T]|| = {hinf['gamma']:.4g}, no stabilising controller below "
-        f"{hinf['gamma_lower']:.4g}; every closed-loop pole left of -{hinf['decay_rate']:.4g} 1/s{unstable}",
+        f"H-infinity stabiliser: ||[W1 S; W2 T]|| = {upper_end(hinf['gamma'], 4)}, no stabilising controller below "
+        f"{lower_end(hinf['gamma_lower'], 4)}; every closed-loop pole left of -{lower_end(hinf['decay_rate'], 4)} 1/s"
+        f"{unstable}",
     )
 
 

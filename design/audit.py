@@ -12,7 +12,7 @@ from design.block import bound_block, geometric_scale, plant_block, plant_numera
 from design.contract import Design
 from design.frequency import frequency_grid
 from design.judgement import Judgement, judge, robust_sector
-from design.mixed_sensitivity import Infimum, infimum
+from design.mixed_sensitivity import Infimum, Synthesis, assess, infimum
 from design.printed_optimum import least_f
 from design.quasi_polynomial import CharacteristicRoots, rightmost_roots
 from design.robustness import Margins, delay_loop, margins_of, responses, tracking_floor
@@ -44,8 +44,8 @@ class Audit:
         Every plant whose dead time differs from the nominal one by less than this, in seconds, lies within W_a.
     same_controller
         The largest |C_aw/C_s - 1| over a grid of frequencies, of an extended design with the exact inverse; else None.
-    infimum
-        Of (2.8), of a delay-free design, or why it was not found; else None.
+    stabiliser, infimum
+        What K reaches and the infimum of (2.8), of a delay-free design, or why they were not found; else None.
     anti_windup
         Name -> its judgement.
     robust_sector
@@ -60,6 +60,7 @@ class Audit:
     tracking_floor: float
     covered_delay_s: float
     same_controller: float | None
+    stabiliser: Synthesis | str | None
     infimum: Infimum | str | None
     anti_windup: dict[str, Judgement]
     robust_sector: dict[str, float]
@@ -95,10 +96,12 @@ def audit(design: Design) -> Audit:
         s = s[np.abs(s) > 1e-2 * number(design.parameters, "a")]  # below, both are differences that vanish
         C_s = smith_controller(plant, design.blocks["C0"], s)
         same = float(np.max(np.abs(anti_windup_controller(plant, forward, feedback, s) / C_s - 1)))
-    interval = None
+    reached = interval = None
     if design.hinf is not None:
-        W1, W2, decay_rate = design.hinf["W1"], design.hinf["W2"], number(design.hinf, "decay_rate")
-        interval = _attempt(lambda: infimum(design.blocks["G_A"], W1, W2, decay_rate))
+        G_A, K, W1, W2 = design.blocks["G_A"], design.blocks["K"], design.hinf["W1"], design.hinf["W2"]
+        decay_rate = number(design.hinf, "decay_rate")
+        reached = _attempt(lambda: assess(G_A, W1, W2, K, decay_rate))
+        interval = _attempt(lambda: infimum(G_A, W1, W2, decay_rate))
     guaranteed = isinstance(margins, Margins) and margins.is_guaranteed
     kinds = {name: design.compensator(name) for name in design.anti_windup}
     sectors = {name: robust_sector(kind, robustness, shapes) if guaranteed else 0.0 for name, kind in kinds.items()}
@@ -112,6 +115,7 @@ def audit(design: Design) -> Audit:
         tracking_floor=tracking_floor(plant, bound, design.reference_omegas),
         covered_delay_s=covered_delay(plant, bound),
         same_controller=same,
+        stabiliser=reached,
         infimum=interval,
         anti_windup={name: judge(model, kind) for name, kind in kinds.items()},
         robust_sector=sectors,

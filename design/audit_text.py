@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from design.audit import Audit
 from design.block import bound_block
 from design.contract import Design
-from design.mixed_sensitivity import Infimum
+from design.digits import lower_end, upper_end
+from design.mixed_sensitivity import Infimum, Synthesis
 from design.robustness import Margin, Margins
 from identification.plant import PlantModel
 
@@ -50,8 +50,8 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
     if found.with_delay is not None:
         lines += ["", f"The same controller on the plant with its dead time of {1e3 * design.plant.delay_s:g} ms"]
         lines += _margin_lines(found.with_delay)
-    if found.infimum is not None and design.hinf is not None:
-        lines += ["", "H-infinity stabiliser, ||[W1 S; W2 T]||", *_hinf_lines(design.hinf, found.infimum)]
+    if found.stabiliser is not None and found.infimum is not None:
+        lines += ["", "H-infinity stabiliser, ||[W1 S; W2 T]||", *_hinf_lines(found.stabiliser, found.infimum)]
     without = ", for the plant without its dead time" if found.with_delay is not None else ""
     lines += ["", f"Anti-windup{without}", *_columns(_anti_windup_rows(found, windup))]
     alpha, beta, gamma, f = found.least_f
@@ -72,20 +72,23 @@ def _plant_in_words(plant: PlantModel) -> str:
     return f"plant of gain {plant.gain:g}, {zeros} zero and {poles} pole modes, dead time {1e3 * plant.delay_s:g} ms"
 
 
-def _hinf_lines(hinf: Mapping[str, Any], infimum: Infimum | str) -> Iterable[str]:
-    yield f"  of this K                       {hinf['gamma']:.6g}"
+def _hinf_lines(stabiliser: Synthesis | str, infimum: Infimum | str) -> Iterable[str]:
+    reached = stabiliser if isinstance(stabiliser, str) else f"{upper_end(stabiliser.gamma, 6)} at most"
+    yield f"  of this K                       {reached}"
     if isinstance(infimum, Infimum):
-        yield (
-            f"  infimum of (2.8)                in [{infimum.lower:.6g}, {infimum.upper:.6g}], its upper end by a K "
-            "whose "
-            f"loop decays with {infimum.decay_rate:.3g} 1/s"
-        )
+        ends, decay = _interval(infimum.lower, infimum.upper), lower_end(infimum.decay_rate, 3)
+        yield f"  infimum of (2.8)                in {ends}, its upper end by a K whose loop decays with {decay} 1/s"
         yield f"    no K below                    {infimum.reason}"
     else:
         yield f"  infimum of (2.8)                {infimum}"
-    ends = f"[{hinf['gamma_line_lower']:.6g}, {hinf['gamma_line']:.6g}]"
-    yield f"  with a decay of {hinf['decay_rate']:<15.4g} in {ends} on that line"
-    yield f"    no K below                    {hinf.get('line_reason', '')}"
+    if isinstance(stabiliser, Synthesis):
+        ends = _interval(stabiliser.gamma_line_lower, stabiliser.gamma_line)
+        yield f"  with a decay of {lower_end(stabiliser.decay_rate, 4):<15s} in {ends} on that line"
+        yield f"    no K below                    {stabiliser.line_reason}"
+
+
+def _interval(lower: float, upper: float) -> str:
+    return f"[{lower_end(lower, 6)}, {upper_end(upper, 6)}]"
 
 
 def _covered(delay_s: float) -> str:

@@ -10,14 +10,57 @@ from design.anti_windup import printed_form
 from design.block import Block, bound_block, plant_denominator, plant_numerator, require_thesis_class
 from design.contract import Design
 from design.corrected import SETTLED
-from design.internal_model import internal_model, reference_polynomial
+from design.internal_model import InternalModel, internal_model, reference_polynomial
 from design.judgement import SECTOR, compensators
-from design.mixed_sensitivity import SynthesisError, mixed_sensitivity
+from design.mixed_sensitivity import mixed_sensitivity
+from design.pick import Problem
 from identification.files import InputError
 from identification.model import IdentifiedModel
 
 TRACKING = 0.01  # W1 asks for |S| below gamma times this at the reference's frequencies
-FACTORS = (1, 2, 4, 8, 16, 32, 0.5, 0.25)  # of the decay rate, in turn while the synthesis fails its own check
+
+
+def stabiliser_problem(model: IdentifiedModel, period_s: float, epsilon: float) -> tuple[InternalModel, Problem]:
+    """The internal model units, and what the stabiliser K has to minimise.
+
+    Parameters
+    ----------
+    model, period_s, epsilon
+        As for :func:`design_delay_free`.
+
+    Raises
+    ------
+    InputError
+        As :func:`design_delay_free`.
+
+    Notes
+    -----
+    The thesis prints neither W1 nor W2, so their principle is ours, after Remark 1:
+
+    W2 = W_a/G, the multiplicative bound itself, so that ||W2 T|| < 1 is robust stability. Where deg Lambda
+    exceeds deg B it gets as many zeros, an octave above the fastest root, as make W2 G_A biproper.
+
+    W1 has the reference's poles, damped: moved left by twice the decay rate, which makes the stabiliser's
+    zeros there cancel, and W1(0) = 1/TRACKING. The decay rate leaves SETTLED of a transient after one period,
+    or is half that of the slowest mode of plant and bound where these decay more slowly.
+    """
+    if not (math.isfinite(period_s) and period_s > 0):
+        raise InputError(f"the period is {period_s:g} s; expected a positive number")
+    plant = model.plant.without_delay()
+    require_thesis_class(plant)
+    omega = 2 * math.pi / period_s
+    units = internal_model(plant, omega, epsilon)
+    A, B, W_a = plant_denominator(plant), plant_numerator(plant), bound_block(model.additive_bound)
+    slowest = min(-root.real for root in A.zeros + B.zeros + W_a.poles if root != 0)
+    decay_rate = min(math.log(1 / SETTLED) / period_s, slowest / 2)
+
+    fastest = max(abs(root) for root in A.zeros + B.zeros + W_a.poles + units.Lambda.zeros)
+    W2 = W_a * A * B.inverse()
+    missing = (W2 * units.G_A).relative_degree
+    W2 = W2 * Block((2 * fastest) ** -missing, (complex(-2 * fastest),) * missing)
+    damped = tuple(root - 2 * decay_rate for root in reference_polynomial(omega, epsilon).zeros)
+    W1 = Block(float(np.prod(np.abs(damped))) / TRACKING, (), damped)
+    return units, Problem(units.G_A, W1, W2, decay_rate)
 
 
 def design_delay_free(
@@ -52,47 +95,12 @@ def design_delay_free(
 
     Notes
     -----
-    The thesis prints neither W1 nor W2, so their principle is ours, after Remark 1:
-
-    W2 = W_a/G, the multiplicative bound itself, so that ||W2 T|| < 1 is robust stability. Where deg Lambda
-    exceeds deg B it gets as many zeros, an octave above the fastest root, as make W2 G_A biproper.
-
-    W1 has the reference's poles, damped: moved left by twice the decay rate, which makes the stabiliser's
-    zeros there cancel, and W1(0) = 1/TRACKING. The decay rate leaves SETTLED of a transient after one period,
-    or is half that of the slowest mode of plant and bound where these decay more slowly. Where the reference is
-    slower than the plant by many decades the arithmetic may fail its own check; then other decay rates are tried.
-
     C = K A/Lambda has a zero at the plant's pole s = 0 (A(0) = 0; Lemma 1 assumes a stable A): the integrator is
     hidden from the loop and not stabilised, so that a constant disturbance at the plant's input makes y drift.
     """
-    if not (math.isfinite(period_s) and period_s > 0):
-        raise InputError(f"the period is {period_s:g} s; expected a positive number")
-    plant = model.plant.without_delay()
-    require_thesis_class(plant)
-    omega = 2 * math.pi / period_s
-    units = internal_model(plant, omega, epsilon)
-    A, B, W_a = plant_denominator(plant), plant_numerator(plant), bound_block(model.additive_bound)
-    slowest = min(-root.real for root in A.zeros + B.zeros + W_a.poles if root != 0)
-    wanted = min(math.log(1 / SETTLED) / period_s, slowest / 2)
-
-    fastest = max(abs(root) for root in A.zeros + B.zeros + W_a.poles + units.Lambda.zeros)
-    W2 = W_a * A * B.inverse()
-    missing = (W2 * units.G_A).relative_degree
-    W2 = W2 * Block((2 * fastest) ** -missing, (complex(-2 * fastest),) * missing)
-    tried: list[float] = []
-    for factor in FACTORS:
-        decay_rate = min(wanted * factor, slowest / 2)
-        if decay_rate in tried:
-            continue
-        tried.append(decay_rate)
-        damped = tuple(root - 2 * decay_rate for root in reference_polynomial(omega, epsilon).zeros)
-        W1 = Block(float(np.prod(np.abs(damped))) / TRACKING, (), damped)
-        try:
-            synthesis = mixed_sensitivity(units.G_A, W1, W2, decay_rate)
-            break
-        except SynthesisError:
-            if factor == FACTORS[-1]:
-                raise
+    units, problem = stabiliser_problem(model, period_s, epsilon)
+    W1, W2, decay_rate = problem.W1, problem.W2, problem.decay_rate
+    synthesis = mixed_sensitivity(problem.G, W1, W2, decay_rate)
     if recovery_s is None:
         recovery_s = math.log(1 / SETTLED) / (2 * decay_rate)
     anti_windup = compensators(model, recovery_s, sector, bandwidth)
@@ -101,7 +109,7 @@ def design_delay_free(
         kind="delay-free",
         plant=model.plant,
         additive_bound=model.additive_bound,
-        reference_omegas=(omega,),
+        reference_omegas=(2 * math.pi / period_s,),
         blocks={
             "Lambda": units.Lambda,
             "F1": units.F1,
@@ -110,7 +118,7 @@ def design_delay_free(
             "K": synthesis.K,
             "theta1_tilde": thesis.theta1_tilde,
             "theta1": thesis.theta1_tilde * units.one_plus_F,  # Eq. (2.17)
-            "theta2": thesis.theta2(plant),  # Eq. (2.18)
+            "theta2": thesis.theta2(model.plant.without_delay()),  # Eq. (2.18)
         },
         hinf={
             "gamma_lower": synthesis.gamma_lower,

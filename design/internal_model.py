@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,7 +84,7 @@ def internal_model(plant: PlantModel, omega: float, epsilon: float) -> InternalM
     fill = max(0, len(B.zeros) - 4)
     fastest = max((abs(root) for root in A.zeros + B.zeros if root != 0), default=omega)
     Lambda = reference_polynomial(omega, epsilon) * Block(1.0, (complex(-fastest),) * fill)
-    q = geometric_scale(A, Lambda)
+    q = 2.0 ** round(math.log2(geometric_scale(A, Lambda)))  # powers of 2 scale without rounding
     difference = np.polysub(polynomial(Lambda, q), polynomial(A, q))
     return InternalModel(
         Lambda=Lambda,

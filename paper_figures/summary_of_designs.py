@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from design.contract import Design
+from design.digits import lower_end, upper_end
 from paper_figures.captions import number, of_run, only, required_input
 from paper_figures.summary_of_fit import Table
 
@@ -79,8 +80,8 @@ def sentences(design: Design, name: str, tables: Mapping[str, pd.DataFrame]) -> 
     if design.hinf:
         said = [
             "For the plant without its dead time",
-            f"||[W1 S; W2 T]|| = {number(design.hinf['gamma'], 4)}, no stabilising controller below "
-            f"{number(design.hinf['gamma_lower'], 4)}",
+            f"||[W1 S; W2 T]|| = {upper_end(design.hinf['gamma'], 4)}, no stabilising controller below "
+            f"{lower_end(design.hinf['gamma_lower'], 4)}",
         ]
         if not design.blocks["K"].is_stable:
             said.append("K itself is UNSTABLE and diverges when the actuator saturates")

@@ -1,4 +1,4 @@
-"""The optimum of (2.8) by another method, which shares nothing with the Riccati equations: Nehari's theorem by FFT.
+"""The optimum of (2.8) by another method, which shares nothing with Pick's matrix: Nehari's theorem by FFT.
 
 With T = 1 - S the norm is at most gamma where |T - T0| <= R at every frequency,
 
@@ -15,11 +15,12 @@ coefficients of f are had by FFT.
 
 from __future__ import annotations
 
+import mpmath as mp
 import numpy as np
 from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from design.block import Block
+from design.block import Block, geometric_scale
 
 
 def nehari_optimum(G: Block, W1: Block, W2: Block, a: float, points: int) -> float:
@@ -99,3 +100,83 @@ def _hankel_norm(samples: np.ndarray) -> float:
     operator = LinearOperator((size, size), matvec=lambda x: multiply(x.ravel()), dtype=float)
     start = np.ones(size)
     return float(np.abs(eigsh(operator, k=1, which="LM", v0=start, tol=1e-10, return_eigenvectors=False)[0]))
+
+
+def nehari_excess(W1: Block, W2: Block, gamma: float, digits: int) -> float:
+    """The Hankel norm less 1 at gamma, to so many digits: positive where no stabilising controller reaches gamma.
+
+    Parameters
+    ----------
+    W1, W2
+        Weights without common roots, whose |W1|^2 + |W2|^2 has simple zeros; G, which is not asked for, has neither
+        poles nor zeros right of the axis.
+    gamma
+        Above what the weights alone cost.
+    digits
+        Of the arithmetic.
+
+    Notes
+    -----
+    f has the simple poles s_k right of the axis, the roots of D |d_1 d_2|^2. Its part there, sum r_k/(s - s_k), has the
+    Hankel norm lambda_max(P Q)^(1/2) with P_kl = 1/(s_k + conj(s_l)) and Q_kl = conj(r_k) r_l/(conj(s_k) + s_l).
+    """
+    with mp.workdps(digits):
+        unit = mp.mpf(geometric_scale(W1, W2))
+        (n1, d1), (n2, d2) = ((_polynomial(W, W.zeros, unit), _polynomial(None, W.poles, unit)) for W in (W1, W2))
+        delta_squared = _plus(_times(_modulus(n1), _modulus(d2)), _times(_modulus(n2), _modulus(d1)))
+        nu_squared = _plus(
+            [mp.mpf(gamma) ** 2 * c for c in delta_squared], [-c for c in _times(_modulus(n1), _modulus(n2))]
+        )
+        (delta, _), (nu, nu_gain) = _right_roots(delta_squared), _right_roots(nu_squared)
+        points = list(delta)
+        residues = []
+        for k, s in enumerate(points):
+            outer = mp.fprod((s + z) / (s - z) for j, z in enumerate(points) if j != k) * 2 * s
+            value = mp.polyval(_modulus_in_s(n1), s) * mp.polyval(d2, -s) / mp.polyval(d1, s)
+            residues.append((-1) ** len(points) * value * outer / (nu_gain * mp.fprod(s + z for z in nu)))
+        count = len(points)
+        P = mp.matrix(count, count)
+        Q = mp.matrix(count, count)
+        for k in range(count):
+            for j in range(count):
+                P[k, j] = 1 / (points[k] + mp.conj(points[j]))
+                Q[k, j] = mp.conj(residues[k]) * residues[j] / (mp.conj(points[k]) + points[j])
+        values = mp.eig(P * Q, left=False, right=False)
+        return float(mp.sqrt(max(mp.re(value) for value in values)) - 1)
+
+
+def _polynomial(W: Block | None, roots: tuple[complex, ...], unit: mp.mpf) -> list[mp.mpf]:
+    """Real coefficients in s/unit, highest power first."""
+    result = [mp.mpc(1) if W is None else W.gain * unit**-W.relative_degree]
+    for root in roots:
+        result = _times(result, [mp.mpf(1), -mp.mpc(root) / unit])
+    return [mp.re(c) for c in result]
+
+
+def _times(first: list[mp.mpf], second: list[mp.mpf]) -> list[mp.mpf]:
+    result = [mp.mpf(0)] * (len(first) + len(second) - 1)
+    for i, a in enumerate(first):
+        for j, b in enumerate(second):
+            result[i + j] += a * b
+    return result
+
+
+def _plus(first: list[mp.mpf], second: list[mp.mpf]) -> list[mp.mpf]:
+    length = max(len(first), len(second))
+    pad = [[mp.mpf(0)] * (length - len(part)) + part for part in (first, second)]
+    return [a + b for a, b in zip(*pad, strict=True)]
+
+
+def _modulus_in_s(p: list[mp.mpf]) -> list[mp.mpf]:
+    """p(s) p(-s)."""
+    return _times(p, [c * (-1) ** (len(p) - 1 - k) for k, c in enumerate(p)])
+
+
+def _modulus(p: list[mp.mpf]) -> list[mp.mpf]:
+    """p(s) p(-s) as a polynomial in s^2."""
+    return _modulus_in_s(p)[::2]
+
+
+def _right_roots(even: list[mp.mpf]) -> tuple[list[mp.mpc], mp.mpf]:
+    """The right half plane's roots of a polynomial in s^2, and the leading coefficient of its spectral factor."""
+    return [mp.sqrt(z) for z in mp.polyroots(even, maxsteps=500, extraprec=400)], mp.sqrt(abs(even[0]))

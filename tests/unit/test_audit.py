@@ -17,6 +17,7 @@ from design.audit import audit
 from design.contract import Design, read_design
 from design.delay_free import design_delay_free
 from design.extended import design_extended
+from design.mixed_sensitivity import Synthesis
 from identification.model import IdentifiedModel
 from identification.plant import AdditiveBound, Mode, PlantModel
 
@@ -73,6 +74,18 @@ def test_chapter_two_with_and_without_its_dead_time(delay_free_design: Design) -
     assert found.infimum.upper < delay_free_design.hinf["gamma"]
 
 
+def test_what_the_stabiliser_reaches_is_not_taken_from_the_file(delay_free_design: Design) -> None:
+    hinf, K = delay_free_design.hinf, delay_free_design.blocks["K"]
+    assert hinf is not None
+    found = audit(dataclasses.replace(delay_free_design, hinf={**hinf, "gamma": 1e-9, "gamma_line_lower": 1.0}))
+    assert isinstance(found.stabiliser, Synthesis)
+    for name in ("gamma_lower", "gamma", "gamma_line_lower", "gamma_line", "decay_rate", "reason", "line_reason"):
+        assert getattr(found.stabiliser, name) == hinf[name]
+    slower = audit(dataclasses.replace(delay_free_design, blocks={**delay_free_design.blocks, "K": K.scaled(0.01)}))
+    assert isinstance(slower.stabiliser, str)
+    assert "with K a closed-loop pole lies at Re s = " in slower.stabiliser
+
+
 def test_a_dead_time_that_the_design_ignored_may_be_fatal(implied: IdentifiedModel) -> None:
     plant = dataclasses.replace(implied.plant, delay_s=0.2)
     found = audit(design_delay_free(dataclasses.replace(implied, plant=plant), 4.0, 1e-4))
@@ -120,7 +133,7 @@ def test_what_is_printed_of_chapter_two(delay_free_design: Design, tmp_path: Pat
     for part in (
         "on the plant with its dead time of 8.1 ms",
         "infimum of (2.8)",
-        "spectral radius of X Y",
+        "no stable T meets its 14 conditions",
         "cancelled",
     ):
         assert part in said

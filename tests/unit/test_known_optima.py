@@ -20,7 +20,7 @@ def brackets(found: Synthesis, known: float, rel: float = 1e-9) -> None:
     """Known lies between what is proved and what is achieved, and these are as near as the synthesis promises."""
     assert found.gamma_lower <= known * (1 + rel)
     assert known <= found.gamma * (1 + rel)
-    assert found.gamma <= 1.012 * found.gamma_lower
+    assert found.gamma <= 1.01 * found.gamma_lower
 
 
 def test_weights_alone() -> None:
@@ -49,14 +49,14 @@ def test_constant_weights_unstable_pole() -> None:
     """T(p) = 1, so that the norm is w2 at least; T = 1 everywhere approaches it."""
     found = mixed_sensitivity(Block(2.0, (-3.0,), (2.0,)), Block(0.6), Block(0.8), 0.0)
     brackets(found, 0.8)
-    assert found.reason.startswith("T = 1 at the unstable poles of G")
+    assert found.reason == "T = 1 at the pole 2 of G costs 0.8"
 
 
 def test_constant_weights_unstable_zero() -> None:
     """S(z) = 1, so that the norm is w1 at least; K = 0 reaches it."""
     found = mixed_sensitivity(Block(2.0, (3.0,), (-2.0,)), Block(0.6), Block(0.8), 0.0)
     brackets(found, 0.6)
-    assert found.reason.startswith("no state feedback")
+    assert found.reason == "S = 1 at the zero 3 of G costs 0.6"
 
 
 def pick_optimum(w1: float, w2: float, p: float, z: float) -> float:
@@ -76,7 +76,7 @@ def test_constant_weights_unstable_pole_and_zero(w1: float, w2: float, p: float,
     G, known = Block(2.0, (z,), (p,)), pick_optimum(w1, w2, p, z)
     found = mixed_sensitivity(G, Block(w1), Block(w2), 0.0)
     brackets(found, known)
-    assert found.reason.startswith("spectral radius of X Y is 1.000")
+    assert found.reason.startswith("no stable T meets its 2 conditions: Pick's matrix has a pivot of -")
     assert nehari_optimum(G, Block(w1), Block(w2), 2.0, 128) == pytest.approx(known, rel=1e-8)
 
 
@@ -195,7 +195,7 @@ def agrees_with_nehari(found: Synthesis, problem: Sequence[Block], a: float, poi
     assert coarse == pytest.approx(known, rel=1e-7)
     assert found.gamma_line_lower <= known * (1 + 1e-7)
     assert known <= 1.0002 * found.gamma_line_lower
-    assert known <= found.gamma_line <= 1.012 * found.gamma_line_lower
+    assert known <= found.gamma_line <= 1.01 * found.gamma_line_lower
 
 
 # poles on the axis
@@ -207,14 +207,14 @@ def test_infimum_with_poles_on_the_axis(G: Block) -> None:
     found = infimum(G, Block(0.6), Block(0.8), 0.3)
     assert found.lower == pytest.approx(0.8, rel=1e-12)
     assert found.lower * (1 - 1e-9) <= found.upper <= 1.01 * found.lower
-    assert found.reason.startswith("T = 1 at the pole 0+")
+    assert found.reason.startswith("T = 1 at the pole ")
 
 
 def test_infimum_without_poles_on_the_axis() -> None:
     problem = coprime(Block(1.0, (), (-1.0,)))
     found = infimum(*problem, 0.3)
     assert found.decay_rate == 0
-    assert found.lower <= np.sqrt(4 - 2 * np.sqrt(2)) <= found.upper <= 1.0012 * found.lower
+    assert found.lower <= np.sqrt(4 - 2 * np.sqrt(2)) <= found.upper <= 1.001 * found.lower
 
 
 def test_infimum_of_chapter_two(delay_free_design: Design) -> None:
