@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from design.block import Block
-from design.frequency import frequency_grid, peak
+from design.frequency import frequency_grid
 
 Real = NDArray[np.float64]
 
@@ -70,33 +70,6 @@ def popov_sector(
     )
     height, multiplier = max((heights[k], float(trials[k])), (float(-found.fun), float(found.x)))
     return (float("inf") if height >= 0 else -1 / height), multiplier
-
-
-def circle_sector(
-    theta1_tilde: Block, perturbation: Callable[[Real], Real] | None = None, roots: tuple[complex, ...] = ()
-) -> float:
-    """The largest sector of the circle criterion: :func:`popov_sector` with the multiplier 0.
-
-    It alone speaks of a dead zone that varies with time, as one does that is seen from a trajectory.
-
-    Parameters
-    ----------
-    theta1_tilde, perturbation, roots
-        As of :func:`popov_sector`.
-
-    Returns
-    -------
-    float
-        Re theta1~(j omega) - perturbation + 1/k > 0 for all omega and every sector below k; infinite when the left
-        side without 1/k is never negative, 0 when there is none.
-    """
-
-    def below(omega: Real) -> Real:
-        lost = 0.0 if perturbation is None else perturbation(omega)
-        return np.asarray(lost - theta1_tilde(1j * omega).real)
-
-    height = max(peak(below, theta1_tilde.zeros + theta1_tilde.poles + roots)[0], -float(theta1_tilde(0j).real))
-    return float("inf") if height <= 0 else 1 / height
 
 
 def robust_loss(one_plus: Block, robustness: Callable[[Real], Real]) -> Callable[[Real], Real]:

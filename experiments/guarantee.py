@@ -11,9 +11,9 @@ import numpy as np
 
 from design.anti_windup import AntiWindup
 from design.block import bound_block, plant_block
+from design.circle_criterion import circle_sector
 from design.contract import Design
 from design.frequency import frequency_grid
-from design.popov import circle_sector, robust_loss
 from design.robustness import delay_loop, margins_of, responses
 from identification.files import InputError
 from identification.plant import PlantModel
@@ -59,6 +59,8 @@ def guarantee_within(design: Design, anti_windup: AntiWindup) -> Guarantee:
     """What a design promises of its runs with every plant within W_a, see :func:`design.popov.robust_loss`."""
     if missing := _without_theta2(design, anti_windup):
         return missing
+    from design.popov import robust_loss  # only here: it takes a third of a second to import
+
     plant, bound = design.loop_plant, design.additive_bound
     loop = delay_loop(design, plant)
     try:

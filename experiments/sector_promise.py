@@ -35,6 +35,9 @@ from identification.plant import PlantModel
 
 A_EXCURSION = 64  # samples of u between two crossings of the limits, at least
 A_TIME_CONSTANT = 10  # samples of u beyond the limits in the loop's shortest time constant
+REFINEMENTS = 8  # of the samples around the largest u and secant, and around where the guarantee is left
+A_REFINEMENT = 33  # samples of each, in place of three
+CONVERGED = 1e-12
 A_PERIOD = 200  # samples of v_s in a period of the reference
 MOST_SAMPLES = 1e6
 
@@ -47,8 +50,8 @@ class Verdict:
     ----------
     guarantee
         Of the run's design and anti-windup.
-    largest_control
-        U, the largest |u|.
+    largest_control, largest_control_at_s
+        U, the largest |u|, and when.
     largest_steady
         V, the most that |v_s| reaches.
     limit
@@ -61,6 +64,7 @@ class Verdict:
 
     guarantee: Guarantee
     largest_control: float
+    largest_control_at_s: float
     largest_steady: float
     limit: float
     needed_sector: float
@@ -79,6 +83,11 @@ class Verdict:
         if self.largest_steady >= self.limit:
             return self.limit
         return math.inf if k >= 1 else (self.limit - k * self.largest_steady) / (1 - k)
+
+    def agrees(self, other: Verdict) -> bool:
+        """Whether both have the same largest |u| and needed sector, to rounding."""
+        own, others = (np.array([each.largest_control, each.needed_sector]) for each in (self, other))
+        return bool(np.all(np.abs(own - others) <= CONVERGED * np.abs(own)))
 
     @property
     def needs(self) -> str:
@@ -172,11 +181,12 @@ def verdict(
     low, high = limits
     never = bool(np.all((low <= control) & (control <= high)))
     needed = np.zeros(len(time_s)) if never else needed_sector(control, steady, limits)
-    at = int(np.argmax(needed))
+    at, largest = int(np.argmax(needed)), int(np.argmax(np.abs(control)))
     left = np.flatnonzero(needed >= given.sector)
     return Verdict(
         guarantee=given,
-        largest_control=float(np.abs(control).max()),
+        largest_control=float(abs(control[largest])),
+        largest_control_at_s=float(time_s[largest]),
         largest_steady=float(np.abs(steady).max()),
         limit=min(-low, high),
         needed_sector=float(needed[at]),
@@ -207,13 +217,21 @@ def judge_run(
         r(t) and the true plant.
     """
     time_s, control = run.time_s, run.control
-    if len(run.events_s) or control[0] != run.saturated_control[0]:
-        between = finely(loop, run, reference)
-        control = np.append(control, simulate(replace(loop, outputs={}), limits, between).control)
-        time_s = np.append(time_s, between)
-        order = np.argsort(time_s, kind="stable")
-        time_s, control = time_s[order], control[order]
-    return verdict(given, time_s, control, steady_control(reference, plant, time_s), limits)
+    found = verdict(given, time_s, control, steady_control(reference, plant, time_s), limits)
+    if not len(run.events_s) and control[0] == run.saturated_control[0]:
+        return found
+    only_u = replace(loop, outputs={})
+    more = finely(loop, run, reference)
+    for _ in range(REFINEMENTS):
+        time_s, first = np.unique(np.append(time_s, more), return_index=True)
+        control = np.append(control, simulate(only_u, limits, more).control)[first]
+        before, found = found, verdict(given, time_s, control, steady_control(reference, plant, time_s), limits)
+        if found.agrees(before):
+            break
+        at = np.searchsorted(time_s, [found.largest_control_at_s, found.needed_at_s, found.left_at_s])
+        around = time_s[np.clip(np.add.outer([-1, 1], at), 0, len(time_s) - 1)]
+        more = np.unique(np.linspace(around[0], around[1], A_REFINEMENT))
+    return found
 
 
 def finely(loop: SaturatedLoop, run: Run, reference: Reference | SampledReference) -> np.ndarray:

@@ -12,15 +12,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from design.anti_windup import second_order
+from design.circle_criterion import circle_sector
 from design.contract import Design
 from design.extended import design_extended
-from design.popov import circle_sector, popov_sector
+from design.popov import popov_sector
 from experiments.__main__ import main
 from experiments.closed_loop import simulate
+from experiments.delay_free import delay_free_tables
+from experiments.extended import extended_tables
 from experiments.guarantee import Guarantee, guarantee, guarantee_within, sector_text
 from experiments.loops import design_loop
 from experiments.scenarios import Reference, SampledReference, sinusoid, thesis_reference
 from experiments.sector_promise import Verdict, judge_run, needed_sector, steady_control, verdict
+from experiments.tracking import loops, run_all, tracking_summary, verdicts
 from experiments.uncertain_plants import PlantsWithin
 from identification.model import IdentifiedModel
 from identification.plant import AdditiveBound, Mode, PlantModel
@@ -104,10 +108,12 @@ def test_no_control_up_to_the_covered_one_leaves_the_guarantee(
 @pytest.mark.parametrize("limits", [(-12.0, 12.0), (-20.0, 20.0), (-45.0, 45.0), (-14.0, 60.0), (-60.0, 14.0)])
 def test_the_largest_secant_is_found_whatever_the_rows(extended_design: Design, limits: tuple[float, float]) -> None:
     secant, control = densely(extended_design, limits, CHAPTER_4, 6.0)
-    for rows in (6, 6000):
-        found = judged(extended_design, limits, CHAPTER_4, 6.0, rows)
-        assert found.needed_sector == pytest.approx(secant, rel=1e-3)
-        assert found.largest_control == pytest.approx(control, rel=1e-3)
+    few, many = (judged(extended_design, limits, CHAPTER_4, 6.0, rows) for rows in (6, 6000))
+    assert few.needed_sector == pytest.approx(many.needed_sector, rel=1e-11)
+    assert few.largest_control == pytest.approx(many.largest_control, rel=1e-11)
+    for found in (few, many):
+        assert secant * (1 - 1e-12) <= found.needed_sector <= secant * (1 + 1e-4)
+        assert control * (1 - 1e-12) <= found.largest_control <= control * (1 + 1e-4)
         assert found.limit == min(-limits[0], limits[1])
         assert found.covered == (secant < found.guarantee.sector)
 
@@ -351,3 +357,33 @@ def test_a_sector_in_words() -> None:
         "1",
         "inf",
     ]
+
+
+def test_the_summaries_hold_what_is_promised(extended_design: Design, delay_free_design: Design) -> None:
+    for limit in (12.0, 45.0, 400.0):
+        rows = extended_tables(extended_design, limit)["extended_summary"].set_index("run")
+        found = judged(extended_design, (-limit, limit), CHAPTER_4, 5 * 2 * np.pi / 1.5)
+        corrected = rows.loc["corrected"]
+        assert corrected["covered"] == found.covered
+        for name in ("needed_sector", "largest_control", "covered_control"):
+            assert corrected[name] == pytest.approx(getattr(found, name), rel=1e-9)
+        assert corrected["guaranteed_sector"] == found.guarantee.sector
+        assert rows.loc["thesis", "guaranteed_sector"] == 0
+        assert not rows.loc[["none", "thesis", "none_pade", "thesis_pade"], "covered"].any()
+        assert rows.loc[["none", "none_pade", "thesis_pade"], "guaranteed_sector"].isna().all()
+    rows = delay_free_tables(delay_free_design)["delay_free_summary"].set_index("run")
+    assert rows.loc["corrected", "needed_sector"] == 1  # the reference takes 11.05, beyond the limits of 10
+    assert not rows["covered"].any()
+
+
+def test_a_run_that_diverges_is_not_covered(delay_free_design: Design) -> None:
+    """The summary has an empty cell in place of each number."""
+    reference = thesis_reference("delay-free", delay_free_design.reference_omegas)
+    exact = loops(delay_free_design, reference)
+    runs = run_all(exact, 10.0, np.linspace(0.0, 24.0, 2401))
+    lost = dataclasses.replace(runs["none"], control=np.full(2401, np.nan))
+    found = verdicts(delay_free_design, exact, runs | {"corrected": lost}, 10.0, reference)
+    assert set(found) == {"thesis"}
+    summary = tracking_summary(runs | {"corrected": lost}, found, 10.0, False, reference, 11.05, 4.0).set_index("run")
+    assert summary.loc["corrected", ["guaranteed_sector", "needed_sector", "largest_control"]].isna().all()
+    assert summary.loc["corrected", "covered"] == 0
