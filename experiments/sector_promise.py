@@ -51,7 +51,7 @@ class Verdict:
     guarantee
         Of the run's design and anti-windup.
     largest_control, largest_control_at_s
-        U, the largest |u|, and when.
+        U, the largest |u|, and when; of a run that never saturates, among its own times.
     largest_steady
         V, the most that |v_s| reaches.
     limit

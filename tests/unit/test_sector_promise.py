@@ -365,8 +365,10 @@ def test_the_summaries_hold_what_is_promised(extended_design: Design, delay_free
         found = judged(extended_design, (-limit, limit), CHAPTER_4, 5 * 2 * np.pi / 1.5)
         corrected = rows.loc["corrected"]
         assert corrected["covered"] == found.covered
-        for name in ("needed_sector", "largest_control", "covered_control"):
-            assert corrected[name] == pytest.approx(getattr(found, name), rel=1e-9)
+        assert corrected["needed_sector"] == pytest.approx(found.needed_sector, rel=1e-9)
+        if found.needed_sector:
+            assert corrected["largest_control"] == pytest.approx(found.largest_control, rel=1e-9)
+        assert corrected["covered_control"] == pytest.approx(found.covered_control, rel=1e-4)  # as v_s is sampled
         assert corrected["guaranteed_sector"] == found.guarantee.sector
         assert rows.loc["thesis", "guaranteed_sector"] == 0
         assert not rows.loc[["none", "thesis", "none_pade", "thesis_pade"], "covered"].any()
