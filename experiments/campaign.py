@@ -17,10 +17,12 @@ import identification
 from design.contract import Design
 from experiments import delay_free, extended
 from experiments.closed_loop import DivergenceError, simulate
+from experiments.guarantee import Guarantee, guarantee_within
 from experiments.loops import Controller, plant_loop, realized_controller
 from experiments.metrics import last_saturation, settling_time
 from experiments.perturbed_stability import PerturbedLoop
 from experiments.scenarios import Reference, thesis_reference
+from experiments.sector_promise import judge_run
 from experiments.tracking import SETTLED, compensators, span
 from experiments.uncertain_plants import PlantsWithin
 from identification.files import InputError
@@ -29,6 +31,7 @@ from identification.thesis import printed
 
 SAMPLES_PER_PERIOD = 500
 CHUNK = 25  # plants that one task runs
+MEASURED = ("peak_error", "steady_error", "recovery_s", "last_saturation_s", "events")  # of a run that does not diverge
 
 Columns = dict[str, list[Any]]
 
@@ -134,6 +137,12 @@ def run_chunk(campaign: Campaign, first: int, last: int) -> Columns:
             Exact; None if it saturates to the end.
         events
             How often the control crosses a limit.
+        guaranteed_sector
+            Of every plant within W_a, see :func:`experiments.guarantee.guarantee_within`; 0: nothing is guaranteed.
+        covered
+            Whether the guarantee covers the run, see :mod:`experiments.sector_promise`.
+        largest_control, needed_sector
+            The largest |u|, and the sector that the run needs; None where nothing is guaranteed.
         gain, delay_s, zero_omega_1, zero_zeta_1, ..., real_zero_1, ...
             The true plant.
 
@@ -176,6 +185,9 @@ class _Runner:
         self.loop = PerturbedLoop(design)
         kinds = compensators(design)
         self.controllers = {name: realized_controller(design, kind) for name, kind in kinds.items()}
+        self.guarantees = {
+            name: Guarantee(0.0) if kind is None else guarantee_within(design, kind) for name, kind in kinds.items()
+        }
         self.reference = campaign.reference
         samples = campaign.periods * SAMPLES_PER_PERIOD + 1
         self.time_s = np.linspace(0.0, campaign.horizon_s, samples)
@@ -187,21 +199,24 @@ class _Runner:
         numbers = parameters(member.plant)
         return [
             {"plant": index, "anti_windup": name, "distance": member.distance, "linear_stable": stable}
-            | self._metrics(member.plant, controller)
+            | self._metrics(member.plant, controller, self.guarantees[name])
             | numbers
             for name, controller in self.controllers.items()
         ]
 
-    def _metrics(self, plant: PlantModel, controller: Controller) -> dict[str, Any]:
+    def _metrics(self, plant: PlantModel, controller: Controller, given: Guarantee) -> dict[str, Any]:
         loop = plant_loop(controller, plant, self.reference)
         loop = replace(loop, outputs={"error": loop.outputs["error"]})  # the others need not be read
-        limit = self.campaign.limit
+        limits = (-self.campaign.limit, self.campaign.limit)
+        promised = {"guaranteed_sector": given.sector, "covered": False, "largest_control": None, "needed_sector": None}
         try:
-            run = simulate(loop, (-limit, limit), self.time_s)
+            run = simulate(loop, limits, self.time_s)
         except DivergenceError:
-            return {"diverged": True} | dict.fromkeys(
-                ("peak_error", "steady_error", "recovery_s", "last_saturation_s", "events")
-            )
+            return {"diverged": True} | promised | dict.fromkeys(MEASURED)
+        if given.sector:
+            found = judge_run(given, loop, limits, run, self.reference, plant)
+            promised |= {"covered": found.covered, "largest_control": found.largest_control}
+            promised |= {"needed_sector": found.needed_sector}
         error = np.abs(run.outputs["error"])
         band, steady = SETTLED * self.reference.amplitude, float(error[-SAMPLES_PER_PERIOD - 1 :].max())
         recovery = _number(settling_time(self.time_s, error, band)) if steady <= band else None
@@ -212,7 +227,7 @@ class _Runner:
             "recovery_s": recovery,
             "last_saturation_s": _number(last_saturation(run)),
             "events": len(run.events_s),
-        }
+        } | promised
 
 
 def parameters(plant: PlantModel) -> dict[str, float]:

@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from design.contract import read_design
 from experiments.campaign_tables import PERCENT, campaign_tables
+from experiments.guarantee import sector_text
 from experiments.run_commands import DESIGN, positive_limit
 from identification.files import InputError, read_bytes
 
@@ -63,14 +64,26 @@ def campaign_command(
         finally:
             done.close()
     file.finish()
+    summary = campaign_tables(output)["campaign_summary"]
+    click.echo(_promised(summary))
     click.echo(f"{plants} plants within W_a -> {output}; limits +-{limit:.6g}, {campaign.horizon_s:.6g} s each")
-    for line in _lines(campaign_tables(output)["campaign_summary"]):
+    for line in _lines(summary):
         click.echo(line)
+
+
+def _promised(summary: pd.DataFrame) -> str:
+    """Of which anti-windup a guarantee speaks of these plants, and how many of its runs it covers."""
+    said = [
+        f"the guarantee of {row['run']}, the sector {sector_text(row['guaranteed_sector'])}, covers "
+        f"{row['covered']:.2%} of its runs"
+        for row in summary[summary["guaranteed_sector"] > 0].to_dict("records")
+    ]
+    return f"Of all plants within W_a {'; '.join(said)}" if said else "No guarantee speaks of all plants within W_a"
 
 
 def _lines(summary: pd.DataFrame) -> list[str]:
     """The summary as a table."""
-    shares = {"linear_stable": "stable", "diverged": "diverged", "recovered": "recovered"}
+    shares = {"covered": "covered", "linear_stable": "stable", "diverged": "diverged", "recovered": "recovered"}
     measures = {"peak_error_{}": "peak error", "steady_error_{}": "last period", "recovery_{}_s": "recovery s"}
     heads = [f"{label:>11s}" for label in shares.values()]
     lines = ["".join([" " * 10, *heads, *(f"{f'{label}, 5 50 95 %':>30s}" for label in measures.values())])]

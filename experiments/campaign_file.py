@@ -18,7 +18,7 @@ PARTS_A_GROUP = 80  # of the file's row groups: 6000 rows
 SYNTHETIC = "plants drawn at random inside W_a, not measured"
 PACKAGES = ("antiwindup-thesis", "numpy", "scipy", "numba", "pyarrow")
 TOLD = ("synthetic", "kind", "design_sha256", "seed", "plants", "limit", "horizon_s")  # in the file's metadata
-TEXTS, WHOLE, FLAGS = ("anti_windup",), ("plant", "events"), ("linear_stable", "diverged")
+TEXTS, WHOLE, FLAGS = ("anti_windup",), ("plant", "events"), ("linear_stable", "diverged", "covered")
 
 
 class CampaignFile:

@@ -16,7 +16,7 @@ MEASURES = {"peak_error": "peak_error_{}", "steady_error": "steady_error_{}", "r
 STEPS = 200  # of the plants' share, at which the distributions are tabulated
 PERCENT = (5, 50, 95)  # of the plants, in the summary
 BINS = 10  # of the distance
-OUTCOMES = ("linear_stable", "diverged", "recovered")
+OUTCOMES = ("linear_stable", "diverged", "recovered", "covered")
 
 ROWS = 65536  # that are held at a time
 DIGIT = 8  # bits of the quantiles that one reading of the file settles
@@ -28,6 +28,8 @@ COLUMNS = {
     "distance": "float64",
     "linear_stable": "bool",
     "diverged": "bool",
+    "covered": "bool",
+    "guaranteed_sector": "float64",
 }
 COLUMNS |= dict.fromkeys(MEASURES, "float64")
 FACTS = {"plants": int, "seed": int, "limit": float, "horizon_s": float}
@@ -49,10 +51,11 @@ def campaign_tables(path: Path) -> dict[str, pd.DataFrame]:
         ``campaign``: for each anti-windup (run) and share of the plants (1/200 to 1) the peak_error, steady_error and
         recovery_s that so many of them do not exceed. ``campaign_distance``: for each run and each tenth of the
         distance (from, to) the number of plants there, and the shares of them whose linear loop is stable
-        (linear_stable), whose run diverges and whose run recovers; empty where there is no plant.
-        ``campaign_summary``: for each run plants, seed, limit, horizon_s, the three shares among all plants, the 5, 50
-        and 95 % quantiles of the three numbers, and worst_plant, that of the largest steady error; of several, such as
-        those that diverge, the nearest to the model.
+        (linear_stable), whose run diverges, recovers and is covered by its guarantee; empty where there is no plant.
+        ``campaign_summary``: for each run plants, seed, limit, horizon_s, the four shares among all plants, the
+        guaranteed_sector (0: nothing is guaranteed of these plants), the 5, 50 and 95 % quantiles of the three numbers,
+        and worst_plant, that of the largest steady error; of several, such as those that diverge, the nearest to the
+        model.
 
     Raises
     ------
@@ -66,13 +69,13 @@ def campaign_tables(path: Path) -> dict[str, pd.DataFrame]:
     plants, that of share p is the ceil(p n)-th.
     """
     facts = _facts(path)
-    counts, worst = _count(path, facts["plants"])
+    counts, sectors, worst = _count(path, facts["plants"])
     steps = np.arange(1, STEPS + 1)
     values = _order_statistics(path, -(-steps * facts["plants"] // STEPS) - 1)
     quantiles = np.where(np.isfinite(values), values, np.nan)
     edges = np.linspace(0.0, 1.0, BINS + 1)
     distributions, distances, rows = [], [], []
-    for name, of_run, count, plant in zip(RUNS, quantiles, counts, worst, strict=True):
+    for name, of_run, count, sector, plant in zip(RUNS, quantiles, counts, sectors, worst, strict=True):
         measured = dict(zip(MEASURES, of_run, strict=True))
         distributions.append(pd.DataFrame({"run": name, "share": steps / STEPS} | measured))
         plants, *outcomes = count
@@ -80,6 +83,7 @@ def campaign_tables(path: Path) -> dict[str, pd.DataFrame]:
         distances.append(pd.DataFrame({"run": name, "from": edges[:-1], "to": edges[1:], "plants": plants} | shares))
         row = {"run": name} | facts
         row |= {what: part.sum() / facts["plants"] for what, part in zip(OUTCOMES, outcomes, strict=True)}
+        row["guaranteed_sector"] = sector
         for measure, form in MEASURES.items():
             row |= {form.format(percent): measured[measure][percent * STEPS // 100 - 1] for percent in PERCENT}
         rows.append(row | {"worst_plant": plant})
@@ -166,24 +170,31 @@ def _checked(path: Path, piece: Columns) -> Columns:
     return piece | measured | {"run": run}
 
 
-def _count(path: Path, plants: int) -> tuple[np.ndarray, list[int]]:
-    """How many plants, and with each of OUTCOMES, by (run, which of the four, bin); and each run's worst plant."""
+def _count(path: Path, plants: int) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """How many plants, and with each of OUTCOMES, by (run, which of five, bin); each run's sector and worst plant."""
     counts = np.zeros((len(RUNS), 1 + len(OUTCOMES), BINS), dtype=np.int64)
+    sectors = np.full((2, len(RUNS)), np.nan)  # the least and the largest, which are one
     worst = [(-1.0, 0.0, 0)] * len(RUNS)  # steady error, -distance, -plant
     for piece in _read(path):
         bins = np.minimum((BINS * piece["distance"]).astype(np.int64), BINS - 1)
         recovered = np.isfinite(piece["recovery_s"])
-        for k, what in enumerate((np.full(len(bins), True), piece["linear_stable"], piece["diverged"], recovered)):
+        every = np.full(len(bins), True)
+        outcomes = (every, piece["linear_stable"], piece["diverged"], recovered, piece["covered"])
+        for k, what in enumerate(outcomes):
             np.add.at(counts[:, k], (piece["run"][what], bins[what]), 1)
         for run in range(len(RUNS)):
             own = piece["run"] == run
             order = np.column_stack([piece["steady_error"], -piece["distance"], -piece["plant"]])[own]
             if len(order):
+                given = piece["guaranteed_sector"][own]
+                sectors[:, run] = np.fmin(sectors[0, run], given.min()), np.fmax(sectors[1, run], given.max())
                 worst[run] = max(worst[run], tuple(order[np.lexsort(order.T[::-1])[-1]]))
     for name, found in zip(RUNS, counts[:, 0].sum(axis=1), strict=True):
         if found != plants:
             raise InputError(f"{path}: {found} rows with anti_windup {name}; expected one for each of {plants} plants")
-    return counts, [int(-plant) for _, _, plant in worst]
+    if (sectors[0] != sectors[1]).any():
+        raise InputError(f"{path}: the guaranteed_sector of one anti_windup differs; expected one of each")
+    return counts, sectors[1], [int(-plant) for _, _, plant in worst]
 
 
 def _order_statistics(path: Path, ranks: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from experiments.metrics import last_saturation
 from experiments.pade import with_pade
 from experiments.saturated_loop import SaturatedLoop
 from experiments.scenarios import thesis_reference
-from experiments.tracking import loops, run_all, span, tracking_summary, tracking_table
+from experiments.tracking import loops, run_all, span, tracking_summary, tracking_table, verdicts
 from identification.files import InputError
 from identification.thesis import printed
 
@@ -53,9 +53,12 @@ def extended_tables(design: Design, limit: float | None = None) -> dict[str, pd.
         limit = usual_limit(design)
     every = exact | {f"{name}_pade": with_pade(exact[name], PADE_ORDER) for name in ("none", "thesis")}
     runs = run_all(every, limit, np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1))
+    promised = verdicts(design, exact, runs, limit, reference)
     return {
         "extended": tracking_table(runs, reference),
-        "extended_summary": tracking_summary(runs, limit, limit_is_given, reference, required, horizon / PERIODS),
+        "extended_summary": tracking_summary(
+            runs, promised, limit, limit_is_given, reference, required, horizon / PERIODS
+        ),
     }
 
 

@@ -14,12 +14,14 @@ import pandas as pd
 from design.anti_windup import AntiWindup, printed_form
 from design.contract import Design, read_design
 from experiments.closed_loop import simulate
+from experiments.guarantee import guarantee
 from experiments.loops import design_loop
 from experiments.metrics import last_saturation
 from experiments.reference_file import read_reference
 from experiments.sampled import Drive, simulate_sampled
 from experiments.sampled_controller import METHODS
 from experiments.scenarios import Reference, SampledReference, thesis_reference
+from experiments.sector_promise import judge_run, steady_control, verdict
 from experiments.tables import write_tables
 from identification.files import InputError
 from identification.model import read_model
@@ -91,8 +93,9 @@ def simulate_command(
     kind = _compensator(content, anti_windup, {"alpha": alpha, "beta": beta, "gamma": gamma})
     # the quotient of two decimals may come out a rounding below a whole number
     time_s = sample_time * np.arange(int(until / sample_time * (1 + 1e-12)) + 1)
-    loop = design_loop(content, _reference(content, **reference), kind, _true_plant(plant))
-    run = simulate(loop, (-limit, limit), time_s)
+    limits, asked, true = (-limit, limit), _reference(content, **reference), _true_plant(plant)
+    loop = design_loop(content, asked, kind, true)
+    run = simulate(loop, limits, time_s)
     table = pd.DataFrame(
         {
             "time_s": run.time_s,
@@ -103,12 +106,16 @@ def simulate_command(
             "saturated_control": run.saturated_control,
         }
     )
+    promised = ""
+    if kind is not None:
+        given = guarantee(content, kind, true)
+        promised = str(judge_run(given, loop, limits, run, asked, true or content.loop_plant))
     write_tables({output: table}, _inputs(design, plant, reference["reference"]))
     saturated = last_saturation(run)
     said = "saturated to the end" if np.isnan(saturated) else f"last saturated at {saturated:.6g} s"
     if not len(run.events_s) and not np.isnan(saturated):
         said = "never saturated"
-    click.echo(f"{len(table)} rows -> {output}; {len(run.events_s)} crossings of the limits, {said}")
+    click.echo(_first(promised, f"{len(table)} rows -> {output}; {len(run.events_s)} crossings of the limits, {said}"))
 
 
 @click.command("sampled")
@@ -141,11 +148,24 @@ def sampled_command(
     _require_few_rows(until * rate)
     content = read_design(design)
     kind = _compensator(content, anti_windup, {})
-    run = simulate_sampled(content, _reference(content, **reference), kind, drive, until, _true_plant(plant))
-    write_tables({output: pd.DataFrame(vars(run))}, _inputs(design, plant, reference["reference"]))
+    asked, true = _reference(content, **reference), _true_plant(plant)
+    run = simulate_sampled(content, asked, kind, drive, until, true)
     beyond = run.time_s[np.abs(run.control) > limit]
     last = f", the last at {beyond[-1]:.6g} s" if len(beyond) else ""
-    click.echo(f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}")
+    promised = ""
+    if kind is not None and len(beyond):
+        steady = steady_control(asked, true or content.loop_plant, run.time_s)
+        found = verdict(guarantee(content, kind, true), run.time_s, run.control, steady, drive.limits)
+        promised = str(found)
+        if found.covered:
+            promised = f"Within the guarantee of continuous time, which knows no computer and no drive: {found.needs}"
+    write_tables({output: pd.DataFrame(vars(run))}, _inputs(design, plant, reference["reference"]))
+    click.echo(_first(promised, f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}"))
+
+
+def _first(promised: str, said: str) -> str:
+    """What a command says, after what it says of the run's guarantee, if anything."""
+    return f"{promised}; {said}" if promised else said
 
 
 def positive_limit(limit: float | None) -> float | None:

@@ -11,10 +11,12 @@ import pandas as pd
 from design.anti_windup import AntiWindup
 from design.contract import Design
 from experiments.closed_loop import DivergenceError, Run, simulate
+from experiments.guarantee import guarantee
 from experiments.loops import design_loop
 from experiments.metrics import last_saturation, over_last, settling_time
 from experiments.saturated_loop import SaturatedLoop
 from experiments.scenarios import Reference
+from experiments.sector_promise import Verdict, judge_run
 from identification.model import number
 
 SETTLED = 0.01  # band of the settling time, as a share of the reference's amplitude
@@ -64,6 +66,18 @@ def _run(loop: SaturatedLoop, limit: float, time_s: np.ndarray) -> Run:
         )
 
 
+def verdicts(
+    design: Design, loops: Mapping[str, SaturatedLoop], runs: Mapping[str, Run], limit: float, reference: Reference
+) -> dict[str, Verdict]:
+    """For each run of :func:`loops` with an anti-windup that did not diverge, whether its guarantee covers it."""
+    kinds = {name: kind for name, kind in compensators(design).items() if kind is not None}
+    return {
+        name: judge_run(guarantee(design, kind), loops[name], (-limit, limit), runs[name], reference, design.loop_plant)
+        for name, kind in kinds.items()
+        if np.isfinite(runs[name].control[-1])
+    }
+
+
 def tracking_table(runs: Mapping[str, Run], reference: Reference) -> pd.DataFrame:
     """time_s, reference and, for every run NAME, output_NAME, error_NAME, control_NAME, saturated_NAME."""
     time_s = next(iter(runs.values())).time_s
@@ -77,7 +91,13 @@ def tracking_table(runs: Mapping[str, Run], reference: Reference) -> pd.DataFram
 
 
 def tracking_summary(
-    runs: Mapping[str, Run], limit: float, limit_is_given: bool, reference: Reference, required: float, span_s: float
+    runs: Mapping[str, Run],
+    verdicts: Mapping[str, Verdict],
+    limit: float,
+    limit_is_given: bool,
+    reference: Reference,
+    required: float,
+    span_s: float,
 ) -> pd.DataFrame:
     """One row a run: what the captions say.
 
@@ -85,6 +105,8 @@ def tracking_summary(
     ----------
     runs
         Name -> run.
+    verdicts
+        See :func:`verdicts`.
     limit
         Of the actuator, in its unit.
     limit_is_given
@@ -103,7 +125,10 @@ def tracking_summary(
         (error within 1 % of the reference's amplitude, measured from the lasting offset of the error; empty:
         never), offset and ripple (middle and half distance of the extremes of the error over the last period),
         peak_error_after_1s, relative_error_percent (largest error of the last period over the reference's
-        amplitude). A run that diverges has empty cells.
+        amplitude). A run that diverges has empty cells. Then, of :mod:`experiments.sector_promise`,
+        guaranteed_sector (0: nothing is guaranteed), needed_sector, largest_control (the largest |u|) and
+        covered_control (how large it may be wherever v_s is), empty for a run without anti-windup, by Pade's
+        approximation or that diverges; and covered (0 or 1).
     """
     rows = []
     for name, run in runs.items():
@@ -122,5 +147,15 @@ def tracking_summary(
                 "peak_error_after_1s": np.abs(error[run.time_s >= 1.0]).max(),
                 "relative_error_percent": 100 * (abs(offset) + ripple) / reference.amplitude,
             }
+            | _promised(verdicts.get(name))
         )
     return pd.DataFrame(rows)
+
+
+def _promised(found: Verdict | None) -> dict[str, float]:
+    names = ("guaranteed_sector", "needed_sector", "largest_control", "covered_control")
+    if found is None:
+        return dict.fromkeys(names, np.nan) | {"covered": 0}
+    covered_control = found.covered_control if found.guarantee.sector else np.nan
+    numbers = (found.guarantee.sector, found.needed_sector, found.largest_control, covered_control)
+    return dict(zip(names, numbers, strict=True)) | {"covered": int(found.covered)}

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pandas as pd
 
+from experiments.guarantee import sector_text
 from experiments.metrics import settling_time
 from identification.files import InputError
 
@@ -77,3 +78,30 @@ def required_input(summary: pd.DataFrame) -> str:
         f"Following the reference takes an input of amplitude {number(required, 4)}, "
         f"which {verdict} the limits of +-{number(limit, 4)}"
     )
+
+
+def promised(summary: pd.DataFrame, run: str) -> str:
+    """Say of a run with an anti-windup whether its guarantee covers it, and what it needs."""
+    guaranteed, needed, largest_control, covered_control = (
+        of_run(summary, run, column)
+        for column in ("guaranteed_sector", "needed_sector", "largest_control", "covered_control")
+    )
+    if math.isnan(guaranteed):
+        return "diverges, and no guarantee covers it"
+    if needed == 0:
+        return "never saturates and needs no guarantee"
+    if guaranteed == 0:
+        return "has no guarantee, since theta2 is not stable"
+    if of_run(summary, run, "required") >= of_run(summary, run, "limit"):
+        return "is NOT covered by its guarantee, since the reference takes more than the limits give"
+    verdict = "is covered" if of_run(summary, run, "covered") else "is NOT covered"
+    return (
+        f"{verdict} by its guarantee: it needs the sector {sector_text(needed)}, {sector_text(guaranteed)} is "
+        f"guaranteed (|u| reaches {number(largest_control)}, up to {number(covered_control)} is covered)"
+    )
+
+
+def promises(summary: pd.DataFrame) -> str:
+    """Say so of the runs with both anti-windups, the corrected one first."""
+    corrected, thesis = (promised(summary, run) for run in ("corrected", "thesis"))
+    return f"With the corrected anti-windup the run {corrected}; with the thesis's it {thesis}."

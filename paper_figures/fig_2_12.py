@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures import panels
-from paper_figures.captions import number, of_run, required_input
+from paper_figures.captions import number, of_run, promises, required_input
 from paper_figures.panels import CORRECTED, THESIS
 from paper_figures.style import COLUMN_WIDTH, styled
 
@@ -31,9 +31,9 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     return (
         "Tracking with input saturation under the proposed anti-windup (thesis Fig. 2.12): (a) reference r and output "
         "y, (b) tracking error, for the thesis's theta1~ and for the corrected one, which has theta1~(0) = -1. "
-        f"{required_input(summary)}. {within_reach(limit, required)} Over the last period the error is "
-        f"{thesis} with the thesis's theta1~ and {corrected} with the corrected one. The run starts from rest; the "
-        "thesis prints neither its start nor its horizon."
+        f"{promises(summary)} {required_input(summary)}. {within_reach(limit, required)} Over the last "
+        f"period the error is {thesis} with the thesis's theta1~ and {corrected} with the corrected one. The run "
+        "starts from rest; the thesis prints neither its start nor its horizon."
     )
 
 

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures import panels
-from paper_figures.captions import largest, number, of_run, settled
+from paper_figures.captions import largest, number, of_run, promises, settled
 from paper_figures.extended import beginning, chosen_limit
 from paper_figures.panels import CORRECTED, THESIS
 from paper_figures.style import FULL_WIDTH, styled
@@ -30,10 +30,10 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
         "Output under input saturation with the extended anti-windup (thesis Fig. 4.3): (a) reference r and output y, "
         "(b) tracking error with the thesis's theta1~; (c), (d) the same with the corrected one, which has theta1~(0) "
         "= -1; (e) for the thesis's theta1~, the beginning of the exact output less that of the same loop with "
-        f"second-order Pade approximations: at most {largest(difference)}, and {largest(later)} later. The text says "
-        "that the output recovers after around 4.46 seconds and that the error converges to zero. The thesis's "
-        "theta1~ leaves the plant's integrator in theta2, which never forgets what a saturation fed it: the error "
-        f"{thesis}. With the "
+        f"second-order Pade approximations: at most {largest(difference)}, and {largest(later)} later. "
+        f"{promises(summary)} The text says that the output recovers after around 4.46 seconds and that the error "
+        "converges to zero. The thesis's theta1~ leaves the plant's integrator in theta2, which never forgets what a "
+        f"saturation fed it: the error {thesis}. With the "
         f"corrected one the error {corrected}. {chosen_limit(tables)}"
     )
 

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures import panels
-from paper_figures.captions import largest, last_saturated, of_run
+from paper_figures.captions import largest, last_saturated, of_run, promises
 from paper_figures.extended import beginning, chosen_limit
 from paper_figures.panels import CORRECTED, THESIS
 from paper_figures.style import FULL_WIDTH, styled
@@ -27,9 +27,9 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     return (
         "Controller output and plant input in the runs of Fig. 4.3 (thesis Fig. 4.4): (a) controller output u, (b) "
         "plant input sat(u) and (c) both at the beginning with the thesis's theta1~; (d) to (f) the same with the "
-        "corrected one, which has theta1~(0) = -1; dotted: the limits, in the thesis red dashed. The text says that "
-        f"the damaging effects of the saturation are resolved. With the thesis's theta1~ {thesis}; with the "
-        f"corrected one {corrected}. {chosen_limit(tables)}"
+        "corrected one, which has theta1~(0) = -1; dotted: the limits, in the thesis red dashed. "
+        f"{promises(summary)} The text says that the damaging effects of the saturation are resolved. With the "
+        f"thesis's theta1~ {thesis}; with the corrected one {corrected}. {chosen_limit(tables)}"
     )
 
 

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from experiments.guarantee import sector_text
 from paper_figures import panels
 from paper_figures.captions import number, of_run, only
 from paper_figures.panels import CORRECTED, NONE, THESIS
@@ -41,7 +42,8 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
         "What the anti-windup does over the plants that W_a admits (not in the thesis). SYNTHETIC: "
         f"{plants} plants that we drew (seed {int(only(summary, 'seed'))}), each in the loop of the same design, under "
         f"the limits +-{number(only(summary, 'limit'))}, for {number(only(summary, 'horizon_s'))} s of the thesis's "
-        "reference. How they lie within W_a is a choice of ours, so the shares are no probabilities of a real plant. "
+        f"reference. {_promised(summary)} How they lie within W_a is a choice of ours, so the shares are no "
+        "probabilities of a real plant. "
         "(a) to (c) The share of all the plants whose numbers are no larger: the peak of |e| after a quarter of the "
         "reference's period, the peak of the last period, and the time after which |e| stays within 1 % of the "
         "reference's amplitude. Runs that diverge or do not recover count among all, so a line may end below 1. With "
@@ -50,6 +52,19 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
         f"|P_true - P|/|W_a|: broad grey, the linear loop is stable ({_percent(only(summary, 'linear_stable'))} of "
         "all); coloured, the run recovers."
     )
+
+
+def _promised(summary: pd.DataFrame) -> str:
+    """Of which anti-windup a guarantee speaks of these plants, and how many of its runs it covers."""
+    said = [
+        f"with the {run} one, the sector {sector_text(sector)}, it covers {_percent(of_run(summary, run, 'covered'))} "
+        "of the runs"
+        for run in ("corrected", "thesis")
+        if (sector := of_run(summary, run, "guaranteed_sector")) > 0
+    ]
+    if not said:
+        return "No anti-windup has a guarantee that speaks of all these plants."
+    return f"What an anti-windup guarantees of all these plants: {'; '.join(said)}."
 
 
 def _outcomes(summary: pd.DataFrame) -> str:

@@ -10,7 +10,7 @@ import pandas as pd
 
 from design.contract import Design
 from design.digits import lower_end, upper_end
-from paper_figures.captions import number, of_run, only, required_input
+from paper_figures.captions import number, of_run, only, promises, required_input
 from paper_figures.summary_of_fit import Table
 
 DESIGNS = {"delay_free": "Chapter 2", "extended": "Chapters 3, 4", "robust": "Robust redesign"}
@@ -42,15 +42,16 @@ HEAD = (
     "f of (2.19)",
     "Popov sector",
     "theta2",
+    "guarantee",
     "last saturated",
-    "peak error after 1 s",
+    "peak after 1 s",
     "last period's error",
 )
 RUNS = {"none": "no anti-windup", "thesis": "thesis's anti-windup", "corrected": "corrected anti-windup"}
 
 
 def loop_table(designs: Mapping[str, Design], tables: Mapping[str, pd.DataFrame]) -> Table | None:
-    """A row for each simulated loop: f, Popov sector and theta2 of its anti-windup, and what it does under saturation.
+    """A row for each simulated loop: f, Popov sector and theta2 of its anti-windup, its guarantee, and what it does.
 
     Parameters
     ----------
@@ -65,7 +66,12 @@ def loop_table(designs: Mapping[str, Design], tables: Mapping[str, pd.DataFrame]
         None if nothing was simulated.
     """
     rows = [
-        (f"{DESIGNS[name]}, {label}", *_judgement(designs[name].anti_windup.get(run)), *_outcome(tables[name], run))
+        (
+            f"{DESIGNS[name]}, {label}",
+            *_judgement(designs[name].anti_windup.get(run)),
+            _guarantee(tables[name], run),
+            *_outcome(tables[name], run),
+        )
         for name in designs
         if name in tables
         for run, label in RUNS.items()
@@ -88,6 +94,8 @@ def sentences(design: Design, name: str, tables: Mapping[str, pd.DataFrame]) -> 
     else:
         poles = ", ".join(number(pole.real) if not pole.imag else f"{pole:.3g}" for pole in design.blocks["T_so"].poles)
         said = [f"With the exact dead time; poles of T_so {poles}"]
+    if name in tables:
+        said.insert(0, promises(tables[name]).removesuffix("."))
     thesis, corrected = (design.anti_windup[kind] for kind in ("thesis", "corrected"))
     said.append(
         f"theta1~: alpha = {number(thesis['alpha'])} s, beta = {number(thesis['beta'])} s, gamma = "
@@ -123,6 +131,18 @@ def _judgement(facts: Mapping[str, Any] | None) -> tuple[str, str, str]:
         return "", "", ""
     sector = "any" if facts["popov_sector"] is None else number(facts["popov_sector"])
     return number(facts["f"]), sector, "stable" if facts["theta2_stable"] else "NOT stable"
+
+
+def _guarantee(table: pd.DataFrame, run: str) -> str:
+    """Whether the run keeps within its guarantee, leaves it, or has none."""
+    guaranteed, needed = (of_run(table, run, column) for column in ("guaranteed_sector", "needed_sector"))
+    if isnan(guaranteed):
+        return "" if run == "none" else "LEFT"
+    if needed == 0:
+        return "not needed"
+    if guaranteed == 0:
+        return "none"
+    return "kept" if of_run(table, run, "covered") else "LEFT"
 
 
 def _outcome(table: pd.DataFrame, run: str) -> tuple[str, str, str]:

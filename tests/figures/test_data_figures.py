@@ -74,6 +74,8 @@ def tracking_tables(name: str) -> Tables:
                 **{"run": run, "limit": 6.5, "limit_is_given": 0, "required": 7.25, "last_saturation_s": 3.125 + k},
                 **{"settling_s": 4.5 + k, "offset": -2.5 - k, "ripple": 0.625 + k},
                 **{"peak_error_after_1s": 1.375 + k, "relative_error_percent": 62.5 + k},
+                **{"guaranteed_sector": {"thesis": 0.0, "corrected": 0.875}.get(run, np.nan), "needed_sector": 0.9375},
+                **{"largest_control": 123.5, "covered_control": 7.25, "covered": 0},
             }
         )
     return {name: pd.DataFrame(columns), f"{name}_summary": pd.DataFrame(rows)}
@@ -124,9 +126,14 @@ def campaign_tables() -> Tables:
         tenths = np.arange(10) / 10
         linear = np.where(tenths == 0.2, np.nan, 1 - tenths)  # no plant in the third bin
         distance = {"run": run, "from": tenths, "to": tenths + 0.1, "plants": np.where(tenths == 0.2, 0, 13)}
-        distances.append(pd.DataFrame(distance | {"linear_stable": linear, "diverged": 0.25, "recovered": linear / k}))
+        distances.append(
+            pd.DataFrame(
+                distance | {"linear_stable": linear, "diverged": 0.25, "recovered": linear / k, "covered": 0.0}
+            )
+        )
         row = {"run": run, "plants": 120, "seed": 17, "limit": 13.5, "horizon_s": 21.25, "linear_stable": 0.625}
         row |= {"diverged": 0.25, "recovered": 0.75 - k / 8, "steady_error_50": 10.0 ** (k - 4)}
+        row |= {"covered": 0.0, "guaranteed_sector": 0.0}
         rows.append(row | {"recovery_50_s": 3 * k + 1 if run != "thesis" else np.nan})
     return {
         "campaign": pd.concat(parts, ignore_index=True),
@@ -572,11 +579,16 @@ def test_the_campaign():
         "SYNTHETIC: 120 plants that we drew (seed 17)",
         "under the limits +-13.5, for 21.2 s",
         "no more than 0.12.",  # sqrt(log(40)/240)
+        "No anti-windup has a guarantee that speaks of all these plants. How",
         "Without anti-windup 62.5 % recover, half of all within 4 s, 25 % diverge",
         "with the thesis's 50 % recover, 25 % diverge, and the median of the last period's error is 0.01;",
         "is stable (62.5 % of all)",
     ):
         assert said in caption
+    summary = tables["campaign_summary"]
+    summary.loc[summary["run"] == "corrected", ["guaranteed_sector", "covered"]] = 0.875, 0.375
+    said = "guarantees of all these plants: with the corrected one, the sector 0.875, it covers 37.5 % of the runs. How"
+    assert said in fig_a_06.caption(tables)
 
 
 def test_a_campaign_in_which_nothing_recovers_and_all_diverges(saved):
@@ -643,6 +655,30 @@ def test_caption_is_plain_and_names_the_figure_of_the_thesis(name):
 )
 def test_claimed_tracking_error_is_judged_by_what_an_integrator_can_follow(limit, required, words):
     assert words in fig_2_12.within_reach(limit, required)
+
+
+PROMISED = {
+    "With the corrected anti-windup the run is NOT covered by its guarantee, since the reference takes more than": {},
+    "is NOT covered by its guarantee: it needs the sector 0.938, 0.875 is guaranteed (|u| reaches 124, up to 7.25": {
+        "required": 6.0
+    },
+    "is covered by its guarantee: it needs the sector 0.938, 0.999 is": {
+        **{"required": 6.0, "guaranteed_sector": 0.999, "covered": 1}
+    },
+    "never saturates and needs no guarantee": {"needed_sector": 0.0},
+    "diverges, and no guarantee covers it": {"guaranteed_sector": np.nan},
+}
+
+
+@pytest.mark.parametrize(("said", "numbers"), PROMISED.items())
+@pytest.mark.parametrize("name", ["fig_2_12", "fig_2_13", "fig_4_03", "fig_4_04"])
+def test_captions_say_whether_a_guarantee_covers_the_runs(name, said, numbers):
+    tables = tables_of(name)
+    summary = tables[figure_module(name).TABLES[1]]
+    summary.loc[summary["run"] == "corrected", list(numbers)] = list(numbers.values())
+    caption = figure_module(name).caption(tables)
+    assert said in caption
+    assert "with the thesis's it has no guarantee, since theta2 is not stable." in caption
 
 
 def test_captions_follow_the_data_not_the_thesis():

@@ -136,8 +136,14 @@ def outcomes() -> dict[str, pd.DataFrame | str]:
                 "peak_error_after_1s": 4.5,
             },
             "relative_error_percent": error,
+            **{"guaranteed_sector": sector, "needed_sector": 0.9375, "largest_control": 123.5},
+            **{"covered_control": 17.25, "covered": 0},
         }
-        for run, last, error in (("none", np.nan, np.nan), ("thesis", np.nan, 62.5), ("corrected", 3.125, 0.75))
+        for run, last, error, sector in (
+            ("none", np.nan, np.nan, np.nan),
+            ("thesis", np.nan, 62.5, 0.0),
+            ("corrected", 3.125, 0.75, 0.875),
+        )
     ]
     return {
         **dict.fromkeys(("delay_free", "extended"), pd.DataFrame(rows)),
@@ -219,8 +225,9 @@ gamma = 48.5 by (2.23); corrected for the sector 0.75, recovery in 1.75 s
 The least f of (2.23) over beta is 0.0312
 exceeds the limits of +-6.5
 no anti-windup diverges
-thesis's anti-windup 0.0625 any NOT stable to the end
-1 stable 3.12 s 4.5 0.75 %
+thesis's anti-windup 0.0625 any NOT stable none to the end
+1 stable LEFT 3.12 s 4.5 0.75 %
+Chapter 2: With the corrected anti-windup the run is NOT covered by its guarantee, since the reference takes more
 """
 
 
@@ -363,7 +370,7 @@ def test_command_refuses_what_it_cannot_read(build):
     result = summary(build)
     assert result.exit_code == 2
     path = build / "results" / "extended_summary.csv"
-    assert result.output == f"Error: {path}: no column required, which summary needs\n"
+    assert result.output == f"Error: {path}: no column guaranteed_sector, which summary needs\n"
     (build / "day_0.csv").unlink()
     assert "no such file" in summary(build).output
     assert not list(build.glob("summary.*"))

@@ -19,17 +19,20 @@ from click.testing import CliRunner, Result
 from pyarrow import parquet
 
 from design.contract import Design
+from design.extended import design_extended
 from design.quasi_polynomial import roots_right_of
 from design.robustness import delay_loop
 from experiments import campaign_file
 from experiments.__main__ import main
 from experiments.campaign import Campaign, code_sha256, run_chunk
 from experiments.closed_loop import simulate
+from experiments.guarantee import guarantee_within
 from experiments.loops import design_loop
 from experiments.perturbed_stability import PerturbedLoop
 from experiments.scenarios import thesis_reference
 from experiments.uncertain_plants import PlantsWithin
 from identification.files import InputError
+from identification.model import IdentifiedModel
 from identification.plant import Mode, PlantModel
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -109,6 +112,9 @@ def test_rows_are_those_of_single_runs(campaign: Campaign, extended_design: Desi
     period = 2 * np.pi / 1.5
     time_s = np.linspace(0.0, 5 * period, 2501)
     assert campaign.horizon_s == pytest.approx(5 * period)
+    for promised in ("guaranteed_sector", "covered"):
+        assert columns[promised] == [0] * 3  # |W_a C S| reaches 8.84
+    assert columns["needed_sector"] == columns["largest_control"] == [None] * 3
     for row, name in enumerate(columns["anti_windup"]):
         kind = None if name == "none" else extended_design.compensator(name)
         loop = design_loop(extended_design, campaign.reference, kind, plant.plant)
@@ -143,8 +149,31 @@ def test_a_run_that_diverges_is_a_result(campaign: Campaign, monkeypatch: pytest
     monkeypatch.setattr(module, "simulate", diverges)
     columns = run_chunk(campaign, 0, 1)
     assert columns["diverged"] == [True] * 3
-    for name in ("peak_error", "steady_error", "recovery_s", "last_saturation_s", "events"):
+    for name in ("peak_error", "steady_error", "recovery_s", "last_saturation_s", "events", "needed_sector"):
         assert columns[name] == [None] * 3
+    assert columns["covered"] == [False] * 3
+
+
+@pytest.mark.parametrize("limit", [20.0, 90.0])
+def test_a_guarantee_within_the_bound_covers_the_runs_that_need_less(table: IdentifiedModel, limit: float) -> None:
+    design = design_extended(table, [1.5], 4.0, [(2.0, 1.0)])
+    kind = design.compensator("corrected")
+    columns = run_chunk(Campaign(design, f"robust {limit}", 1, limit, code_sha256()), 0, 2)
+    assert columns["guaranteed_sector"] == [0, 0, guarantee_within(design, kind).sector] * 2
+    for index, row in ((0, 2), (1, 5)):
+        plant = PlantsWithin(design.loop_plant, design.additive_bound).draw(1, index).plant
+        loop = design_loop(design, thesis_reference("extended", (1.5,)), kind, plant)
+        time_s = np.linspace(0.0, 5.0, 200001)
+        control = simulate(replace(loop, outputs={}), (-limit, limit), time_s).control
+        inverse = 1 / complex(plant(1.5j))
+        steady = 50 * abs(inverse) * np.cos(1.5 * time_s + np.angle(inverse))
+        left_out = control - np.clip(control, -limit, limit)
+        beyond = left_out != 0
+        secant = np.max(left_out[beyond] / (control[beyond] - steady[beyond]))
+        assert columns["needed_sector"][row] == pytest.approx(secant, rel=1e-4)
+        assert columns["largest_control"][row] == pytest.approx(np.abs(control).max(), rel=1e-4)
+        assert columns["covered"][row] == (limit == 90.0) == (secant < columns["guaranteed_sector"][row])
+    assert columns["covered"][:2] == [False, False]
 
 
 def test_a_chapter_2_design_runs_too(delay_free_design: Design) -> None:
@@ -175,7 +204,7 @@ def whole(folder: Path) -> bytes:
         patch.setattr(campaign_file, "CHUNK", 2)
         result = run(folder, "whole.parquet")
     assert result.exit_code == 0, result.output
-    assert "24 plants within W_a ->" in result.stdout
+    assert result.stdout.startswith("No guarantee speaks of all plants within W_a\n24 plants within W_a ->")
     assert [line.split()[0] for line in result.stdout.splitlines()[-3:]] == ["none", "thesis", "corrected"]
     return (folder / "whole.parquet").read_bytes()
 

@@ -26,6 +26,8 @@ def plants(count: int = 40) -> pd.DataFrame:
     table = []
     for order, run in enumerate(module.RUNS):
         rows = pd.DataFrame(common | {"anti_windup": run, "diverged": (k % 8 == 7) & (run == "none")})
+        rows["guaranteed_sector"] = 0.75 if run == "corrected" else 0.0
+        rows["covered"] = (k % 4 == 0) & (run == "corrected")
         rows["peak_error"] = 50.0 + (order + 1) * k
         rows["steady_error"] = 10.0 ** (-k / 4.0)
         rows["recovery_s"] = 5.0 + k / 8 if run != "thesis" else np.nan
@@ -88,6 +90,8 @@ def test_the_summary(campaign: Path) -> None:
     assert (table["linear_stable"] == 0.75).all()
     assert list(table["diverged"]) == [0.125, 0, 0]
     assert list(table["recovered"]) == [0.875, 0, 1]
+    assert list(table["covered"]) == [0, 0, 0.25]
+    assert list(table["guaranteed_sector"]) == [0, 0, 0.75]
     corrected = table.loc["corrected"]
     # the 2nd, 20th and 38th of 40
     assert [corrected[f"peak_error_{n}"] for n in (5, 50, 95)] == [53, 107, 161]
@@ -142,6 +146,8 @@ BAD = {
     "0 rows with anti_windup none": lambda: plants().iloc[:0],
     "an anti_windup is 'mine'; expected none, thesis, corrected": lambda: changed("anti_windup", "mine"),
     "a distance is not between 0 and 1": lambda: changed("distance", 1.25),
+    "no column covered": lambda: plants().drop(columns="covered"),
+    "the guaranteed_sector of one anti_windup differs; expected one of each": lambda: changed("guaranteed_sector", 0.5),
     "linear_stable has an empty cell": lambda: changed("linear_stable", None),
     "plant has an empty cell": lambda: changed("plant", None),
     "peak_error of plant 5 is nan; expected a number, or a run that diverges": lambda: changed("peak_error", np.nan),
