@@ -35,7 +35,7 @@ def delay_free_tables(design: Design, limit: float | None = None) -> dict[str, p
     horizon = PERIODS * span(design, reference)
     time_s = np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1)
     runs = run_all(loops(design, reference), limit, time_s)
-    required = reference.required(design.loop_plant)
+    required = reference.required(design.loop_plant).value
     return {
         "delay_free": tracking_table(runs, reference),
         "delay_free_summary": tracking_summary(runs, limit, limit_is_given, reference, required, horizon / PERIODS),
