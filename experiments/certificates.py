@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from experiments.cells import SPARE, UNIT, Cells
 from experiments.exact_chain import positive_exponential
 
-GRAINS = 2.0**50  # weights and controls are whole multiples of 1/GRAINS: their sums have no error
+GRAINS = 50  # bits of the sizes' sum in which weights and controls are whole numbers: no sum of them has an error
 
 
 @dataclass(frozen=True)
@@ -32,11 +33,15 @@ class Samples:
 
 
 def whole(values: np.ndarray, centred: bool) -> np.ndarray:
-    """Values of a size up to 1 as whole multiples of 2^-50, of sum 0 if ``centred``; none becomes larger than 1."""
-    grains = np.rint(values * GRAINS)
+    """Values of a size up to 1 in whole multiples of a power of 2, which add up without error; none exceeds 1.
+
+    If ``centred``, of values whose sum is but a rounding, the sum becomes exactly 0.
+    """
+    unit = 2.0 ** (math.ceil(math.log2(max(1.0, float(np.abs(values).sum())))) - GRAINS)
+    grains = np.rint(values / unit)
     if centred:
         grains[np.abs(grains).argmin()] -= grains.sum()
-    return np.asarray(grains / GRAINS)
+    return np.asarray(grains * unit)
 
 
 def forced(cells: Cells, mu: np.ndarray, r: Samples, gain: float) -> float:
