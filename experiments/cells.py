@@ -197,23 +197,24 @@ class Cells:
         blocks = -(-count // width)
         padded = np.zeros((blocks * width, n))
         padded[:count] = inputs
-        local = np.zeros((blocks, width + 1, n))
+        local = np.zeros((width + 1, blocks, n))
         for j in range(width):
-            local[:, j + 1] = local[:, j] @ powers[1].T + padded[j::width]
+            local[j + 1] = local[j] @ powers[1].T + padded[j::width]
 
         def starts(first: np.ndarray) -> np.ndarray:
             x = np.empty((blocks, n))
             x[0] = first
             for i in range(blocks - 1):
-                x[i + 1] = powers[width] @ x[i] + local[i, width]
+                x[i + 1] = powers[width] @ x[i] + local[width, i]
             return x
 
         if self.start == "periodic":
             block, j = divmod(count, width)
-            end = local[-1, j or width] + powers[j or width] @ starts(first)[-1]
+            end = local[j or width, -1] + powers[j or width] @ starts(first)[-1]
             lacking = np.eye(n) - np.linalg.matrix_power(powers[width], block) @ powers[j]
             first = self._returning(lacking, end, adjoint)
-        x = (local[:, :width] + np.einsum("jab,ib->ija", powers[:width], starts(first))).reshape(-1, n)[: count + 1]
+        moved = (starts(first) @ powers[:width].reshape(-1, n).T).reshape(blocks, width, n)
+        x = (np.swapaxes(local[:width], 0, 1) + moved).reshape(-1, n)[: count + 1]
         if len(x) == count:
             x = np.vstack([x, powers[1] @ x[-1] + inputs[-1]])
         if self.start == "periodic":

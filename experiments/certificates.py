@@ -80,7 +80,7 @@ def forced(cells: Cells, mu: np.ndarray, r: Samples, gain: float) -> float:
     size_A, most_b = np.abs(chain.A), cells.within @ np.abs(chain.b)
     powers = [np.linalg.matrix_power(size_A, power) @ most_b for power in (0, 2, 4, 8)]
     off = (len(chain.b) + 8) * UNIT * (weight @ np.max(powers[:3], axis=0)) * SPARE
-    second, fourth = (np.abs(p @ chain.impulse[power].T).max(axis=1) for power in (2, 4))
+    second, fourth = (np.maximum(*np.abs(chain.impulse[power] @ p.T)) for power in (2, 4))
     sixth = weight @ (np.abs(chain.impulse[6]).max(axis=0) + powers[3] / 8)
     bend = (second + (fourth + sixth / 8) / 8) / 8 * SPARE + off
     if cells.start == "periodic" and cells.plant.integrators:
@@ -124,7 +124,7 @@ def reached(cells: Cells, u: np.ndarray, r: Samples, gain: float, counted: slice
     z = np.column_stack([x[:-1], u])[counted]
     powers = [most_c @ np.linalg.matrix_power(flow, power) for power in (0, 2, 4, 8)]
     off = (n + 10) * UNIT * (np.abs(z) @ np.max(powers[:3], axis=0)) * SPARE
-    second, fourth = (np.abs(z @ chain.output[power].T).max(axis=1) for power in (2, 4))
+    second, fourth = (np.maximum(*np.abs(chain.output[power] @ z.T)) for power in (2, 4))
     sixth = np.abs(z) @ (np.abs(chain.output[6]).max(axis=0) + powers[3] / 8)
     bend = (second + (fourth + sixth / 8) / 8) / 8 * SPARE
     values = np.append(r.values, r.values[0]) if cells.start == "periodic" else r.values

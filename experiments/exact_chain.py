@@ -14,7 +14,6 @@ from identification.plant import Mode, PlantModel
 BITS = 512  # after the point of the integers in which the flow is computed
 LARGEST = 64  # most of the flow's norm that these bits are enough for
 TINY = 2.0**-300  # bounds what is lost in these integers
-PI = Fraction(314159265358979323846264338327950288419716939937510582097494459230781640628620899, 10**80)
 
 Row = list[Fraction]
 

@@ -84,7 +84,7 @@ def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: fl
     target_s
         Wanted time of the last saturation in seconds.
     required
-        Amplitude of the control in the steady state; below it the loop never leaves saturation.
+        The most that the control reaches in the steady state; below it the loop never leaves saturation.
     horizon_s
         How long a run is watched, longer than ``target_s``.
 

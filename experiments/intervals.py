@@ -11,3 +11,8 @@ class Interval:
 
     lower: float
     upper: float
+
+
+def outward(lower: float, upper: float) -> Interval:
+    """The interval of two ends, not negative, that still holds when both are rounded to 12 digits, as tables are."""
+    return Interval(lower * (1 - 1e-11), upper * (1 + 1e-11))

@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 from experiments.cells import UNIT, Cells
 from experiments.certificates import Samples, forced, reached, whole
 from experiments.exact_chain import fastest
-from experiments.intervals import Interval
+from experiments.intervals import Interval, outward
 from experiments.scenarios import Reference
 from identification.files import InputError
 from identification.plant import PlantModel
@@ -127,7 +127,8 @@ class PeakProgram:
         -------
         Interval
             In the unit of y. No measurable u with |u| <= limit stays below ``lower``; some u reaches ``upper``. Both
-            are bounds of the plant and the reference as their numbers say, all roundings included.
+            are bounds of the plant and the reference as their numbers say, all roundings included, that of a table to
+            12 digits too.
 
         Raises
         ------
@@ -154,7 +155,7 @@ class PeakProgram:
         controls = (whole(self._average(u, width, first), self._centred) for width in WIDTHS)
         uppers = [reached(cells, control, r, more, counted) for control in controls]
         lowers = [forced(cells, self._weights(mu, width, first), r, more) for width in WIDTHS] if mu.any() else [0.0]
-        return Interval(scale * max(0.0, *lowers) * (1 - 4 * UNIT), scale * min(uppers) * (1 + 4 * UNIT))
+        return outward(scale * max(0.0, *lowers), scale * min(uppers))
 
     def _weights(self, mu: np.ndarray, width: float, first: int) -> np.ndarray:
         """Averaged weights as :func:`experiments.certificates.forced` wants them, none at the end of the span."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
 
@@ -13,8 +12,7 @@ import numpy as np
 import pandas as pd
 
 from design.contract import Design
-from experiments.exact_chain import PI
-from experiments.intervals import Interval
+from experiments.intervals import Interval, outward
 from experiments.linear_programs import REFINED, SPARE, PeakProgram
 from experiments.metrics import settling_time
 from experiments.scenarios import Reference, thesis_reference
@@ -74,7 +72,7 @@ def periodic_limit(plant: PlantModel, reference: Reference, limit: float) -> Int
     reference = _harmonic(plant, reference, limit)
     if reference.required(plant).at_most <= limit:
         return Interval(0.0, 0.0)
-    return PeakProgram(plant, _period_s(reference), PERIODIC_STEPS, periodic=True).solve(reference, limit)
+    return PeakProgram(plant, reference.exact_period_s, PERIODIC_STEPS, periodic=True).solve(reference, limit)
 
 
 @dataclass(frozen=True)
@@ -134,7 +132,7 @@ class RestLimit:
             time_s, doubt = np.linspace(0.0, self.plant.delay_s, 1001), self.reference.rounding(self.plant.delay_s)
             known, later = float(np.abs(self.reference(time_s)).max()), self.at(0)
             between = self.reference.bend * time_s[1] ** 2 / 8
-            return Interval(max(known - doubt, later.lower), max(known + doubt + between, later.upper))
+            return outward(max(known - doubt, later.lower), max(known + doubt + between, later.upper))
         if index not in self._solved:
             program = self._program
             self._solved[index] = program.solve(self.reference, self.limit, index * program.part, self.plant.delay_s)
@@ -182,7 +180,7 @@ class RestLimit:
         """
         if not band > 0:
             raise InputError(f"the band is {band:g}; expected a positive number")
-        return Interval(self._first(lambda e: e.lower <= band)[0], self._first(lambda e: e.upper <= band)[1])
+        return outward(self._first(lambda e: e.lower <= band)[0], self._first(lambda e: e.upper <= band)[1])
 
     def _first(self, inside: Callable[[Interval], bool]) -> tuple[float, float]:
         """Two neighbouring t0 between which a statement that stays true as E falls becomes so; NaN if it never does."""
@@ -202,7 +200,7 @@ class RestLimit:
     @cached_property
     def _program(self) -> PeakProgram:
         steps = HORIZON * self.steps + SPARE
-        return PeakProgram(self.plant, _period_s(self.reference) * steps / self.steps, steps, periodic=False)
+        return PeakProgram(self.plant, self.reference.exact_period_s * steps / self.steps, steps, periodic=False)
 
 
 def limits_tables(
@@ -215,21 +213,19 @@ def limits_tables(
     design
         Of either kind.
     limits
-        Of the actuator, +-limit each. Unless given, 0.8 to 1.5 times the amplitude that perfect tracking needs,
-        and, if the thesis prints a limit, that.
+        Of the actuator, +-limit each. Unless given, 0.8 to 1.5 times what perfect tracking needs, and, if the thesis
+        prints a limit, that.
     tick
         Called after every program and after every set of runs.
 
     Returns
     -------
     dict
-        ``limits_KIND``, a row for each limit, ascending: limit, required (see
-        :meth:`experiments.scenarios.Reference.required`), periodic_lower, periodic_upper;
-        settling_lower_s, settling_upper_s (from rest, the first time after which the error can stay within 1 % of
-        the reference's amplitude, see :meth:`RestLimit.settling`); and for every run NAME peak_NAME (greatest |error|
-        over the last of twelve periods), settling_NAME_s (to the same band), ratio_NAME (peak_NAME over
-        periodic_lower, at least what it is over the least peak). Cells are empty for what never settles, diverges,
-        or would be divided by zero.
+        ``limits_KIND``, a row for each limit, ascending: limit, required (the most that the control of perfect
+        tracking reaches), periodic_lower, periodic_upper; settling_lower_s, settling_upper_s (from rest, see
+        :meth:`RestLimit.settling`, to within 1 % of the reference's amplitude); and for every run NAME peak_NAME
+        (greatest |error| over the last of twelve periods), settling_NAME_s (to the same band), ratio_NAME (peak_NAME
+        over periodic_lower). Cells are empty for what never settles, diverges, or would be divided by zero.
         ``limits_KIND_summary`` for one limit, the first given or else the printed one: limit, start_s,
         rest_lower, rest_upper (see :class:`RestLimit`) and tail_NAME, the greatest |error| of the run from start_s
         to the horizon of three periods.
@@ -283,10 +279,6 @@ def _row(
         row[f"settling_{run}_s"] = settling_time(time_s, error, band) if peak <= band else math.nan
         row[f"ratio_{run}"] = peak / periodic.lower if periodic.lower > 0 else math.nan
     return row
-
-
-def _period_s(reference: Reference) -> Fraction:
-    return 2 * PI / Fraction(min(omega for omega in reference.omegas if omega > 0))
 
 
 def _harmonic(plant: PlantModel, reference: Reference, limit: float) -> Reference:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
 from design.realization import block_diagonal
 from experiments.saturated_loop import NO_RESETS, Resets
-from experiments.steady_control import Peak, peak, response
+from experiments.steady_control import PI, Peak, peak, response
 from identification.files import InputError
 from identification.plant import PlantModel
 from identification.thesis import printed
@@ -95,6 +96,11 @@ class Reference:
         """Of the slowest sinusoid, in seconds; infinite when all is constant."""
         slowest = min((omega for omega in self.omegas if omega > 0), default=None)
         return math.inf if slowest is None else 2 * math.pi / slowest
+
+    @property
+    def exact_period_s(self) -> Fraction:
+        """:attr:`period_s`, which is finite, to 80 digits."""
+        return 2 * PI / Fraction(min(omega for omega in self.omegas if omega > 0))
 
     def required(self, plant: PlantModel) -> Peak:
         """The most that the control reaches which keeps the plant's output on r in the steady state, in its input unit.

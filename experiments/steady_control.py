@@ -11,6 +11,7 @@ import numpy as np
 
 from identification.plant import PlantModel
 
+PI = Fraction(314159265358979323846264338327950288419716939937510582097494459230781640628620899, 10**80)
 UNIT = 2.0**-52  # twice what one rounding changes
 SAME = 1e-9  # as a share: as near to the ratio of two whole numbers two frequencies have it
 LARGEST = 1000  # denominator of such a ratio

@@ -13,9 +13,10 @@ from scipy.optimize import linprog
 
 from experiments.cells import UNIT, Cells
 from experiments.certificates import Samples, absolute_integral, forced, reached, whole
-from experiments.exact_chain import PI, chain, fastest, positive_exponential
+from experiments.exact_chain import chain, fastest, positive_exponential
 from experiments.physical_limits import RestLimit, periodic_limit
 from experiments.scenarios import Reference, sinusoid
+from experiments.steady_control import PI
 from identification.files import InputError
 from identification.plant import Mode, PlantModel
 
