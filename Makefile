@@ -53,7 +53,7 @@ TABLES := additive_error f_gamma delay_free extended trade_off interpolation rob
 IDENTIFICATION := $(wildcard identification/*.py)
 CONTRACT := $(addprefix identification/,files.py plant.py model.py thesis.py) $(THESIS)
 ENGINE := $(addprefix experiments/,__main__.py tables.py closed_loop.py compiled_loop.py saturated_loop.py taylor.py \
-	propagator.py mesh.py crossings.py loops.py scenarios.py metrics.py)
+	propagator.py mesh.py crossings.py loops.py scenarios.py steady_control.py metrics.py)
 TRACKING := $(ENGINE) $(addprefix experiments/,tracking.py pade.py)
 
 .PHONY: help figures report refit claims test bench study lint clean
@@ -185,7 +185,8 @@ $(call tables,robustness) &: $(ROBUSTNESS) experiments/robustness.py | $(READY)
 	$(call attempt,$(PY) -m experiments robustness $(ROBUSTNESS) --output $(RESULTS),$(call tables,robustness),$(ROBUSTNESS),\
 		$(RESULTS)/robustness)
 
-LIMITED := $(TRACKING) $(addprefix experiments/,physical_limits.py linear_programs.py cells.py)
+BOUNDS := $(addprefix experiments/,linear_programs.py certificates.py cells.py exact_chain.py intervals.py)
+LIMITED := $(TRACKING) $(BOUNDS) experiments/physical_limits.py
 $(call tables,limits_delay_free) &: $(BUILD)/design_delay_free.json $(LIMITED) | $(READY)
 	$(call attempt,$(PY) -m experiments limits $< --output $(RESULTS),$(call tables,limits_delay_free),$<,\
 		$(RESULTS)/limits_delay_free)
@@ -211,7 +212,7 @@ $(DISTRIBUTIONS) &: $(CAMPAIGN) experiments/campaign_tables.py | $(READY)
 	$(call attempt,$(PY) -m experiments campaign-tables $< --output $(RESULTS),$(DISTRIBUTIONS),$<)
 
 # What the thesis does not print: about its text, whatever the MODEL.
-CONDITIONS := $(TRACKING) $(addprefix experiments/,unprinted_conditions.py unprinted_weights.py joint_conditions.py \
+CONDITIONS := $(TRACKING) $(BOUNDS) $(addprefix experiments/,unprinted_conditions.py unprinted_weights.py joint_conditions.py \
 	initial_output.py printed_outcomes.py printed_number.py claims.py claims_inputs.py claims_runs.py claims_statements.py thesis_designs.py pid.py extended.py delay_free.py)
 $(call tables,conditions) &: $(CONDITIONS) $(wildcard design/*.py) $(CONTRACT) data/thesis/claims.csv | $(READY)
 	$(PY) -m experiments conditions --output $(RESULTS)

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 
 from design.block import Block
 from design.extended import design_extended
 from design.quasi_polynomial import DelayLoop, rightmost_roots
+from experiments.cells import UNIT, Cells
+from experiments.certificates import Samples, forced, whole
 from experiments.claims_inputs import Inputs, plant_of
 from experiments.claims_statements import NOTHING, unanimous
 from experiments.closed_loop import simulate
+from experiments.exact_chain import fastest
 from experiments.extended import PERIODS, extended_tables
+from experiments.linear_programs import PHASE
 from experiments.loops import design_loop, pid_loop
 from experiments.metrics import last_saturation, over_last, settling_time
 from experiments.pid import BACK_CALCULATION, HORIZON_S, STEP, pid_tables, printed_benchmark
-from experiments.scenarios import thesis_reference
+from experiments.scenarios import sinusoid, thesis_reference
 from experiments.thesis_designs import chapter_4
 from experiments.tracking import SETTLED
 from identification.model import read_model
@@ -25,7 +31,8 @@ from identification.thesis import printed
 
 BACK_CALCULATIONS = (BACK_CALCULATION, 100 * BACK_CALCULATION)  # in 1/s
 RAMP_S = 0.1  # long against the plant's slowest mode, short against the reference's period
-WINDOW_S, WINDOW_SAMPLES = 32.0, 2**16  # the plant's modes have died out by then; 0.5 ms
+SAMPLES = 100  # of the ramp, at least
+HISTORY_S = 16.0  # the plant's modes have died out by then
 
 
 def pid(inputs: Inputs) -> dict[str, float]:
@@ -151,16 +158,21 @@ def _y_lin_is_linear(limit: float) -> bool:
 
 
 def least_peak_error(plant: PlantModel, limit: float, amplitude: float, omega: float) -> float:
-    """A lower bound for the peak of |r - y| in every half period, whatever the controller.
+    """A lower bound for the peak of |r - y| in every half period, whatever the controller and the time since its start.
 
     Parameters
     ----------
     plant
-        From rest; a dead time makes no difference.
+        With one integrator, in any state; a dead time makes no difference.
     limit
-        |u| <= limit at the plant's input.
+        |u| <= limit at the plant's input at all times.
     amplitude, omega
         Of the sinusoidal reference, omega in rad/s.
+
+    Returns
+    -------
+    float
+        In the unit of the output; a bound with all roundings included, see :func:`experiments.certificates.forced`.
 
     Notes
     -----
@@ -170,16 +182,17 @@ def least_peak_error(plant: PlantModel, limit: float, amplitude: float, omega: f
         integral phi r' - K integral w u = integral phi e' = -integral phi' e <= 2 max |e|,
 
     and integral w u <= limit ||w||_1. The window is as wide as r' exceeds K limit, with edges so smooth that R_0
-    hardly changes it: with a sharp window the modes' ringing would make ||w||_1 large and the bound useless.
+    hardly changes it: with a sharp window the modes' ringing would make ||w||_1 large and the bound useless. Here -phi'
+    are weights at the ends of cells, and what lies more than :data:`HISTORY_S` before is bounded.
     """
-    slope = abs(plant.gain) * limit
-    half_width = np.arccos(min(1.0, slope / (amplitude * omega))) / omega
-    step = WINDOW_S / WINDOW_SAMPLES
-    time_s = (np.arange(WINDOW_SAMPLES) - WINDOW_SAMPLES // 2) * step
-    phase = np.clip((np.abs(time_s) - half_width) / RAMP_S + 0.5, 0, 1)
-    window = (1 + np.cos(np.pi * phase)) / 2
-    s = 2j * np.pi * np.fft.rfftfreq(WINDOW_SAMPLES, step)[1:]
-    R_0 = np.concatenate([[1.0], plant.without_delay()(s) * s / plant.gain])
-    weight = np.fft.irfft(np.fft.rfft(window) * R_0, WINDOW_SAMPLES)
-    needed = np.sum(window * amplitude * omega * np.cos(omega * time_s)) * step
-    return max(0.0, float(needed - slope * np.sum(np.abs(weight)) * step) / 2)
+    half_width = math.acos(min(1.0, abs(plant.gain) * limit / (amplitude * omega))) / omega
+    span_s = half_width + RAMP_S / 2 + HISTORY_S
+    count = math.ceil(span_s * max(fastest(plant) / PHASE, SAMPLES / RAMP_S))
+    time_s = (np.arange(count + 1) - count) * (span_s / count) + half_width + RAMP_S / 2
+    edges = np.append(time_s, time_s[-1] + span_s / count) - span_s / count / 2
+    phase = np.clip((np.abs(edges) - half_width) / RAMP_S + 0.5, 0, 1)
+    weights = whole(-np.diff((1 + np.cos(np.pi * phase)) / 2) / 2, centred=True)
+    rising = sinusoid(amplitude, omega, 0.0, 0.0)
+    r = Samples(rising(time_s) / amplitude, rising.rounding(2 * span_s) / amplitude + UNIT, 0.0)
+    cells = Cells(plant, Fraction(span_s) / count, count, "ever")
+    return amplitude * max(0.0, forced(cells, weights, r, limit / amplitude * (1 + UNIT))) * (1 - UNIT)

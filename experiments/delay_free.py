@@ -37,7 +37,7 @@ def delay_free_tables(design: Design, limit: float | None = None) -> dict[str, p
     exact = loops(design, reference)
     runs = run_all(exact, limit, time_s)
     promised = verdicts(design, exact, runs, limit, reference)
-    required = reference.required(design.loop_plant)
+    required = reference.required(design.loop_plant).value
     return {
         "delay_free": tracking_table(runs, reference),
         "delay_free_summary": tracking_summary(

@@ -45,7 +45,7 @@ def extended_tables(design: Design, limit: float | None = None) -> dict[str, pd.
     :func:`usual_limit`.
     """
     reference = thesis_reference("extended", design.reference_omegas)
-    required = reference.required(design.loop_plant)
+    required = reference.required(design.loop_plant).value
     horizon = PERIODS * span(design, reference)
     exact = loops(design, reference)
     limit_is_given = limit is not None
@@ -74,7 +74,7 @@ def usual_limit(design: Design) -> float:
     target = float(printed()["extended"]["desaturation_s"])
     horizon = PERIODS * max(span(design, reference), target)
     loop = design_loop(design, reference, None)
-    return limit_for_last_saturation(loop, target, reference.required(design.loop_plant), horizon)
+    return limit_for_last_saturation(loop, target, reference.required(design.loop_plant).value, horizon)
 
 
 def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: float, horizon_s: float) -> float:
@@ -87,7 +87,7 @@ def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: fl
     target_s
         Wanted time of the last saturation in seconds.
     required
-        Amplitude of the control in the steady state; below it the loop never leaves saturation.
+        The most that the control reaches in the steady state; below it the loop never leaves saturation.
     horizon_s
         How long a run is watched, longer than ``target_s``.
 

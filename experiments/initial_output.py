@@ -66,8 +66,8 @@ class Conditions:
 
     @cached_property
     def required(self) -> float:
-        """The amplitude of the input that perfect tracking takes, in the actuator's unit."""
-        return self.reference.required(self.design.loop_plant)
+        """The most that the input of perfect tracking reaches, in the actuator's unit."""
+        return self.reference.required(self.design.loop_plant).value
 
     @property
     def initial_reference(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import Any, Literal
 
@@ -11,9 +12,13 @@ import scipy.sparse as sparse
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
-from design.realization import StateSpace
-from experiments.cells import Cells, absolute_integral, integral
+from experiments.cells import UNIT, Cells
+from experiments.certificates import Samples, forced, reached, whole
+from experiments.exact_chain import fastest
+from experiments.intervals import Interval, outward
+from experiments.scenarios import Reference
 from identification.files import InputError
+from identification.plant import PlantModel
 
 SAMPLES = 4  # times in a step at which the program knows the error
 REFINED = 4  # parts of a step, each with a value of u of its own, near the time from which the error counts
@@ -32,29 +37,20 @@ ATTEMPTS: tuple[tuple[Literal["highs-ipm", "highs-ds"], bool], ...] = (
 
 
 @dataclass(frozen=True)
-class Interval:
-    """A number known to lie between ``lower`` and ``upper``."""
-
-    lower: float
-    upper: float
-
-
-@dataclass(frozen=True)
 class PeakProgram:
     """min over u, |u| <= limit, of the greatest |r(t) - y(t)| from a given time on, y the output of a plant.
 
     Parameters
     ----------
     plant
-        Strictly proper, without dead time.
+        Strictly proper; its dead time is left out.
     span_s
         The period, or from rest at t = 0 the horizon, in seconds.
     steps
         Intervals of ``span_s`` in each of which the program holds u; its bounds are evaluated on finer cells.
     periodic
-        Whether u and y are periodic; else y starts from rest.
-    integrates
-        Whether the plant has a pole at zero: a periodic u then has the mean zero and y a free constant.
+        Whether u and y are periodic; else y starts from rest. Where the plant has a pole at zero, a periodic u has
+        the mean zero and y a free constant.
 
     Raises
     ------
@@ -62,35 +58,35 @@ class PeakProgram:
         The fastest pole asks for more than two million cells.
     """
 
-    plant: StateSpace
-    span_s: float
+    plant: PlantModel
+    span_s: Fraction
     steps: int
     periodic: bool
-    integrates: bool
 
     def __post_init__(self) -> None:
         if self.fineness * self.steps > MOST_CELLS:
             raise InputError(
-                f"the plant's fastest pole, {self._fastest:.4g} rad/s, is too fast beside {self.span_s:.4g} s of "
-                f"reference; expected at most {MOST_CELLS * PHASE / self.span_s:.3g} rad/s"
+                f"the plant's fastest pole, {self._fastest:.4g} rad/s, is too fast beside {float(self.span_s):.4g} s "
+                f"of reference; expected at most {MOST_CELLS * PHASE / float(self.span_s):.3g} rad/s"
             )
 
     @property
     def _centred(self) -> bool:
-        return self.periodic and self.integrates
+        return self.periodic and self.plant.integrators > 0
 
     @cached_property
     def _cells(self) -> Cells:
-        return Cells(self.plant, self.cell_s, self.fineness * self.steps, self.periodic, self._centred)
+        count = self.fineness * self.steps
+        return Cells(self.plant, self.span_s / count, count, "periodic" if self.periodic else "rest")
 
     @cached_property
     def _fastest(self) -> float:
-        return float(np.abs(np.linalg.eigvals(self.plant.A)).max())
+        return fastest(self.plant)
 
     @property
     def fineness(self) -> int:
         """Cells in a step."""
-        sample_s = self.span_s / (self.steps * SAMPLES * REFINED)
+        sample_s = float(self.span_s) / (self.steps * SAMPLES * REFINED)
         return SAMPLES * REFINED * max(1, int(np.ceil(sample_s * self._fastest / PHASE)))
 
     @property
@@ -101,7 +97,7 @@ class PeakProgram:
     @property
     def cell_s(self) -> float:
         """Length of a cell in seconds."""
-        return self.span_s / (self.steps * self.fineness)
+        return float(self.span_s) / (self.steps * self.fineness)
 
     @property
     def counted(self) -> int:
@@ -113,46 +109,59 @@ class PeakProgram:
         """Ends of the cells, shape (cells + 1,); of a periodic program without the last, (cells,)."""
         return np.arange(self.steps * self.fineness + (not self.periodic)) * self.cell_s
 
-    def solve(self, reference: np.ndarray, limit: float, first: int = 0) -> Interval:
+    def solve(self, reference: Reference, limit: float, first: int = 0, ahead_s: float = 0.0) -> Interval:
         """Enclose the least peak error.
 
         Parameters
         ----------
         reference
-            r at ``time_s``, in the unit of y.
+            r; if the program is periodic, of its period.
         limit
             Of |u|, positive.
         first
             Index into ``time_s`` from which on the error counts, a multiple of ``part``; 0 if periodic.
+        ahead_s
+            r(t + ahead_s) is followed.
 
         Returns
         -------
         Interval
-            In the unit of y. No measurable u with |u| <= limit stays below ``lower``; some u reaches ``upper``.
+            In the unit of y. No measurable u with |u| <= limit stays below ``lower``; some u reaches ``upper``. Both
+            are bounds of the plant and the reference as their numbers say, all roundings included, that of a table to
+            12 digits too.
 
         Raises
         ------
         InputError
-            The program could not be solved.
+            The program could not be solved, or the plant is too slow or turns too often for a bound.
 
         Notes
         -----
-        The program holds u and knows e at samples only. What that leaves open is closed by moving averages.
-        Averaged, u keeps its limit and stops exciting resonances between the samples. The dual weights mu,
-        sum |mu_j| = 1, bound the error of every u:
-
-            max |e| >= sum mu_j e(t_j) >= sum mu_j r(t_j) - limit * integral |sum mu_j g(t_j - t)| dt,
-
-        g the response to an impulse. Where u has the mean zero, so have the weights, and the median of the sum in
-        the integral may be taken off it. Averaged weights are as good as others, and excite g less. Several
-        averages are tried and the best bound of each kind kept: every one of them holds.
+        The program holds u and knows e at samples only. What that leaves open is closed by moving averages: averaged, u
+        keeps its limit and stops exciting resonances between the samples, and the program's dual weights excite the
+        plant less. What an average of u reaches, :func:`experiments.certificates.reached` bounds; what weights prove,
+        whichever they are, :func:`experiments.certificates.forced`. Several averages are tried and the best bound of
+        each kind kept: every one of them holds, however well the program was solved.
         """
-        scale = float(np.abs(reference).max()) or 1.0
-        r, gain = reference / scale, limit / scale
-        u, mu = self._optimum(r, gain, first)
-        uppers = [self._peak(r, gain * self._average(u, width, first), first) for width in WIDTHS]
-        lowers = [self._certificate(r, gain, self._average(mu, width, first)) for width in WIDTHS]
-        return Interval(scale * max(0.0, *lowers), scale * min(uppers))
+        values = reference(self.time_s + ahead_s)
+        if self._centred:  # a constant counts for nothing
+            values = values - (values.max() + values.min()) / 2
+        scale = float(np.abs(values).max()) or 1.0
+        doubt = reference.rounding(float(self.span_s) + ahead_s) / scale + 4 * UNIT
+        r, gain = Samples(values / scale, doubt, reference.bend * self.cell_s**2 / 8 / scale), limit / scale
+        u, mu = self._optimum(r.values, gain, first)
+        cells, more = self._cells, gain * (1 + 2 * UNIT)
+        counted = slice(first, self.counted)
+        controls = (whole(self._average(u, width, first), self._centred) for width in WIDTHS)
+        uppers = [reached(cells, control, r, more, counted) for control in controls]
+        lowers = [forced(cells, self._weights(mu, width, first), r, more) for width in WIDTHS] if mu.any() else [0.0]
+        return outward(scale * max(0.0, *lowers), scale * min(uppers))
+
+    def _weights(self, mu: np.ndarray, width: float, first: int) -> np.ndarray:
+        """Averaged weights as :func:`experiments.certificates.forced` wants them, none at the end of the span."""
+        weights = self._average(mu, width, first)
+        weights[self.counted :] = 0.0
+        return whole(weights / np.abs(weights).sum(), self._centred)
 
     def _edges(self, first: int) -> np.ndarray:
         """Where the steps begin and end, in cells; from rest they are refined near ``first``."""
@@ -168,7 +177,7 @@ class PeakProgram:
 
         The variables are the states at the steps' ends (but for the start from rest), u in the steps, the peak.
         """
-        c, n = self._scaled.C, len(self._scaled.b)
+        c, n = self._cells.chain.c[None, :], len(self._cells.chain.b)
         edges = self._edges(first)
         lengths = np.diff(edges)
         steps = len(lengths)
@@ -224,16 +233,10 @@ class PeakProgram:
 
     def _over(self, cells: int) -> tuple[np.ndarray, np.ndarray]:
         """What becomes of the states in so many cells, by themselves and under u = 1."""
-        span_s = cells * self.cell_s
-        return expm(self._scaled.A * span_s), integral(self._scaled.A, span_s) @ self._scaled.b
-
-    @cached_property
-    def _scaled(self) -> StateSpace:
-        """The plant with states of which a sinusoid of amplitude 1, at a pole or once in the span, makes 1 at most."""
-        A, b, slowest = self.plant.A, self.plant.b, 2 * np.pi / self.span_s
-        omegas = np.append(slowest, np.abs(np.linalg.eigvals(A)).clip(min=slowest))
-        size = np.max([np.abs(np.linalg.solve(1j * omega * np.eye(len(b)) - A, b)) for omega in omegas], axis=0)
-        return StateSpace(A * size / size[:, None], b / size, self.plant.C * size, self.plant.d)
+        chain = self._cells.chain
+        n = len(chain.b)
+        both = expm(cells * np.block([[chain.A, chain.b[:, None]], [np.zeros((1, n + 1))]]))
+        return both[:n, :n], both[:n, n]
 
     def _average(self, values: np.ndarray, width: float, first: int) -> np.ndarray:
         """Repeated moving averages, from ``first`` on, of values in the cells or at their ends.
@@ -246,35 +249,3 @@ class PeakProgram:
             total = np.append(0.0, np.cumsum(np.pad(later, half, mode="wrap" if self.periodic else "symmetric")))
             later = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
         return np.append(values[:first], later)
-
-    def _peak(self, r: np.ndarray, u: np.ndarray, first: int) -> float:
-        """The greatest error under u, constant in each cell; second differences tell how far it bulges within one."""
-        error = r - self._cells.output(u)
-        error = np.pad(error, 2, mode="wrap") if self.periodic else np.pad(error, 1, mode="edge")
-        if self._centred:
-            error -= (error.max() + error.min()) / 2
-        size, bend = np.abs(error[1:-1]), np.abs(np.diff(error, 2))
-        inside = np.maximum(size[:-1], size[1:]) + np.maximum(bend[:-1], bend[1:]) / 8
-        return float(inside[first : self.counted].max())
-
-    def _certificate(self, r: np.ndarray, gain: float, mu: np.ndarray) -> float:
-        """What the weights mu prove, see :meth:`solve`.
-
-        Within a cell the sum in the integral is smooth: it differs from its chord by at most cell_s^2/8 times the
-        second derivative, which is read at the cell's ends, and in the mean by at most two thirds of that. Where it
-        therefore keeps its sign its integral is known exactly; elsewhere that of its chord, and the rest is added.
-        """
-        mu = np.where(np.arange(len(mu)) < self.counted, mu, 0.0)
-        total = np.abs(mu).sum()
-        if total == 0:
-            return 0.0
-        left, right = self._cells.correlation(mu / total)
-        exact = self._cells.integrals(mu / total)
-        bend = self.cell_s**2 / 8 * np.maximum(*np.abs(self._cells.correlation(mu / total, derivative=2)))
-        if self._centred:
-            middle = np.median(np.append(left, right))
-            left, right, exact = left - middle, right - middle, exact - middle * self.cell_s
-        keeps = (left * right > 0) & (np.minimum(np.abs(left), np.abs(right)) > bend)
-        doubtful = self.cell_s * (absolute_integral(left, right) + 2 / 3 * bend)
-        area = np.where(keeps, np.abs(exact), doubtful).sum()
-        return float(mu @ r / total - gain * area)

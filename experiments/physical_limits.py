@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 
-from design.block import plant_block
 from design.contract import Design
-from design.realization import realize
-from experiments.linear_programs import REFINED, SPARE, Interval, PeakProgram
+from experiments.intervals import Interval, outward
+from experiments.linear_programs import REFINED, SPARE, PeakProgram
 from experiments.metrics import settling_time
 from experiments.scenarios import Reference, thesis_reference
+from experiments.steady_control import SAME
 from experiments.tracking import SETTLED, loops, run_all
 from identification.files import InputError
 from identification.plant import PlantModel
@@ -47,7 +47,8 @@ def periodic_limit(plant: PlantModel, reference: Reference, limit: float) -> Int
     plant
         With at least one pole more than zeros. Its dead time only shifts u.
     reference
-        Periodic: its frequencies, 0 apart, are multiples of the slowest one, whose period u has.
+        Periodic: its frequencies, 0 apart, are multiples of the slowest one, whose period u has. What is a multiple to
+        1e-9 of itself is taken as one.
     limit
         Of the actuator, in its unit, positive and finite.
 
@@ -68,15 +69,10 @@ def periodic_limit(plant: PlantModel, reference: Reference, limit: float) -> Int
     the least peak is a (sqrt(1 - rho^2) - rho arccos(rho)): of a bounded slope, y is at its nearest to r half the
     greatest excess of |r(t1) - r(t2)| over the way K limit |t1 - t2| away.
     """
-    _check(plant, reference, limit)
-    constant = 0.0
-    if not plant.integrators:
-        still = zip(reference.amplitudes, reference.omegas, reference.phases_rad, strict=True)
-        constant = reference.offset + sum(a * math.sin(phase) for a, omega, phase in still if omega == 0)
-    if reference.required(plant) + abs(constant / plant.gain) <= limit:
+    reference = _harmonic(plant, reference, limit)
+    if reference.required(plant).at_most <= limit:
         return Interval(0.0, 0.0)
-    program = _program(plant, reference.period_s, PERIODIC_STEPS, periodic=True)
-    return program.solve(reference(program.time_s), limit)
+    return PeakProgram(plant, reference.exact_period_s, PERIODIC_STEPS, periodic=True).solve(reference, limit)
 
 
 @dataclass(frozen=True)
@@ -112,7 +108,7 @@ class RestLimit:
     _solved: dict[int, Interval] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        _check(self.plant, self.reference, self.limit)
+        object.__setattr__(self, "reference", _harmonic(self.plant, self.reference, self.limit))
 
     @property
     def horizon_s(self) -> float:
@@ -133,15 +129,13 @@ class RestLimit:
     def at(self, index: int) -> Interval:
         """Enclose E(t0) for one t0."""
         if index < 0:
-            time_s = np.linspace(0.0, self.plant.delay_s, 1001)
-            known = float(np.abs(self.reference(time_s)).max())
-            between = self.reference.amplitude * (max(self.reference.omegas) * time_s[1]) ** 2 / 8
-            later = self.at(0)
-            return Interval(max(known, later.lower), max(known + between, later.upper))
+            time_s, doubt = np.linspace(0.0, self.plant.delay_s, 1001), self.reference.rounding(self.plant.delay_s)
+            known, later = float(np.abs(self.reference(time_s)).max()), self.at(0)
+            between = self.reference.bend * time_s[1] ** 2 / 8
+            return outward(max(known - doubt, later.lower), max(known + doubt + between, later.upper))
         if index not in self._solved:
             program = self._program
-            ahead = self.reference(program.time_s + self.plant.delay_s)
-            self._solved[index] = program.solve(ahead, self.limit, index * program.part)
+            self._solved[index] = program.solve(self.reference, self.limit, index * program.part, self.plant.delay_s)
             self.tick()
         return self._known(index)
 
@@ -175,7 +169,9 @@ class RestLimit:
         )
 
     def settling(self, band: float) -> Interval:
-        """Enclose, in seconds, the first t0 from which on |r - y| can stay within ``band``; NaN where there is none.
+        """Enclose, in seconds, the first t0 from which on |r - y| can stay within ``band`` until ``horizon_s``.
+
+        Before ``lower`` none can; a control that was found does from ``upper`` on. NaN where there is none.
 
         Parameters
         ----------
@@ -184,7 +180,7 @@ class RestLimit:
         """
         if not band > 0:
             raise InputError(f"the band is {band:g}; expected a positive number")
-        return Interval(self._first(lambda e: e.lower <= band)[0], self._first(lambda e: e.upper <= band)[1])
+        return outward(self._first(lambda e: e.lower <= band)[0], self._first(lambda e: e.upper <= band)[1])
 
     def _first(self, inside: Callable[[Interval], bool]) -> tuple[float, float]:
         """Two neighbouring t0 between which a statement that stays true as E falls becomes so; NaN if it never does."""
@@ -204,7 +200,7 @@ class RestLimit:
     @cached_property
     def _program(self) -> PeakProgram:
         steps = HORIZON * self.steps + SPARE
-        return _program(self.plant, self.reference.period_s * steps / self.steps, steps, periodic=False)
+        return PeakProgram(self.plant, self.reference.exact_period_s * steps / self.steps, steps, periodic=False)
 
 
 def limits_tables(
@@ -217,19 +213,19 @@ def limits_tables(
     design
         Of either kind.
     limits
-        Of the actuator, +-limit each. Unless given, 0.8 to 1.5 times the amplitude that perfect tracking needs,
-        and, if the thesis prints a limit, that.
+        Of the actuator, +-limit each. Unless given, 0.8 to 1.5 times what perfect tracking needs, and, if the thesis
+        prints a limit, that.
     tick
         Called after every program and after every set of runs.
 
     Returns
     -------
     dict
-        ``limits_KIND``, a row for each limit, ascending: limit, required, periodic_lower, periodic_upper;
-        settling_lower_s, settling_upper_s (from rest, the first time after which the error can stay within 1 % of
-        the reference's amplitude); and for every run NAME peak_NAME (greatest |error| over the last of twelve
-        periods), settling_NAME_s (to the same band), ratio_NAME (peak_NAME over periodic_lower). Cells are empty
-        for what never settles, diverges, or would be divided by zero.
+        ``limits_KIND``, a row for each limit, ascending: limit, required (the most that the control of perfect
+        tracking reaches), periodic_lower, periodic_upper; settling_lower_s, settling_upper_s (from rest, see
+        :meth:`RestLimit.settling`, to within 1 % of the reference's amplitude); and for every run NAME peak_NAME
+        (greatest |error| over the last of twelve periods), settling_NAME_s (to the same band), ratio_NAME (peak_NAME
+        over periodic_lower). Cells are empty for what never settles, diverges, or would be divided by zero.
         ``limits_KIND_summary`` for one limit, the first given or else the printed one: limit, start_s,
         rest_lower, rest_upper (see :class:`RestLimit`) and tail_NAME, the greatest |error| of the run from start_s
         to the horizon of three periods.
@@ -241,12 +237,12 @@ def limits_tables(
     """
     reference = thesis_reference(design.kind, design.reference_omegas)
     plant, name = design.loop_plant, design.kind.replace("-", "_")
-    required = reference.required(plant)
+    required = reference.required(plant).value
     if not limits:
         usual = printed()[name].get("limit", USUAL_MULTIPLE * required)
         limits = [usual, *(multiple * required for multiple in MULTIPLES)]
     for limit in limits:
-        _check(plant, reference, limit)
+        _harmonic(plant, reference, limit)
     rest = RestLimit(plant, reference, limits[0], tick=tick)
     summary = rest.table().assign(limit=limits[0])
     evenly = np.linspace(0.0, RUN_PERIODS * reference.period_s, RUN_PERIODS * SAMPLES_PER_PERIOD + 1)
@@ -285,16 +281,18 @@ def _row(
     return row
 
 
-def _program(plant: PlantModel, span_s: float, steps: int, *, periodic: bool) -> PeakProgram:
-    return PeakProgram(realize(plant_block(plant.without_delay())), span_s, steps, periodic, plant.integrators > 0)
-
-
-def _check(plant: PlantModel, reference: Reference, limit: float) -> None:
+def _harmonic(plant: PlantModel, reference: Reference, limit: float) -> Reference:
+    """The reference with frequencies that are multiples of the slowest; refuses what :func:`periodic_limit` does."""
     if plant.relative_degree < 1:
         raise InputError("the plant has as many zeros as poles; expected more poles, or its output may jump")
-    slowest = 2 * math.pi / reference.period_s
-    if not slowest or any(abs(omega / slowest - round(omega / slowest)) > 1e-6 for omega in reference.omegas):
+    if reference.slope:
+        raise InputError(f"the reference has the slope {reference.slope:g} a second; expected a periodic one")
+    slowest = min((omega for omega in reference.omegas if omega > 0), default=math.inf)
+    harmonics = [round(omega / slowest) for omega in reference.omegas]
+    near = (abs(omega - k * slowest) <= SAME * omega for omega, k in zip(reference.omegas, harmonics, strict=True))
+    if not math.isfinite(slowest) or not all(near):
         said = ", ".join(f"{omega:.6g}" for omega in reference.omegas)
         raise InputError(f"the reference has the frequencies {said} rad/s; expected multiples of a slowest one above 0")
     if not (math.isfinite(limit) and limit > 0):
         raise InputError(f"the limit is {limit:g}; expected a positive finite number")
+    return replace(reference, omegas=tuple(k * slowest for k in harmonics))

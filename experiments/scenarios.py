@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
 from design.realization import block_diagonal
 from experiments.saturated_loop import NO_RESETS, Resets
+from experiments.steady_control import PI, Peak, peak, response
 from identification.files import InputError
 from identification.plant import PlantModel
 from identification.thesis import printed
@@ -69,9 +71,24 @@ class Reference:
         waves = sum(a * np.sin(omega * time_s + phase) for a, omega, phase in parts)
         return np.asarray(waves + self.offset + self.slope * time_s)
 
+    def rounding(self, until_s: float) -> float:
+        """A bound of what r computed at times up to ``until_s`` is off, even if these are off by 4 roundings."""
+        parts = zip(self.amplitudes, self.omegas, self.phases_rad, strict=True)
+        count = len(self.amplitudes)
+        waves = sum(abs(a) * (8 * (omega * until_s + abs(phase)) + 8 + count) for a, omega, phase in parts)
+        return 2.0**-52 * float(waves + 8 * (abs(self.offset) + abs(self.slope) * until_s))
+
+    @property
+    def bend(self) -> float:
+        """The most that |r''| reaches, or more: the sum of |amplitude| omega^2."""
+        return float(sum(abs(a) * omega**2 for a, omega in zip(self.amplitudes, self.omegas, strict=True)) * (1 + 1e-9))
+
     @property
     def amplitude(self) -> float:
-        """The most that the sinusoids add up to, in the plant's output unit."""
+        """The sum of the amplitudes' sizes, in the plant's output unit: the scale of every band.
+
+        The sinusoids never exceed it together; unless their frequencies are independent they may stay below it.
+        """
         return float(np.abs(self.amplitudes).sum())
 
     @property
@@ -80,17 +97,26 @@ class Reference:
         slowest = min((omega for omega in self.omegas if omega > 0), default=None)
         return math.inf if slowest is None else 2 * math.pi / slowest
 
-    def required(self, plant: PlantModel) -> float:
-        """The most that the control reaches which makes the plant's output r in the steady state, in its input unit.
+    @property
+    def exact_period_s(self) -> Fraction:
+        """:attr:`period_s`, which is finite, to 80 digits."""
+        return 2 * PI / Fraction(min(omega for omega in self.omegas if omega > 0))
 
-        The sum of amplitude/|P(j omega)|; 0 at omega = 0, where the plant integrates; and |slope/gain| of a plant
-        with one integrator.
+    def required(self, plant: PlantModel) -> Peak:
+        """The most that the control reaches which keeps the plant's output on r in the steady state, in its input unit.
+
+        It is the control (r/P)(t) = sum of amplitude_i/|P(j omega_i)| sin(omega_i t + phase_i - arg P(j omega_i)), a
+        constant of r over the gain of a plant that does not integrate, and slope/gain of a plant with one integrator.
+        Infinite for a slope that a plant without an integrator would have to follow. See
+        :func:`experiments.steady_control.peak`.
         """
-        parts = zip(self.amplitudes, self.omegas, strict=True)
-        waves = sum(abs(a / complex(plant(1j * omega))) for a, omega in parts if omega > 0)
-        if self.slope == 0 or plant.integrators > 1:
-            return float(waves)
-        return math.inf if plant.integrators == 0 else float(waves + abs(self.slope / plant.gain))
+        parts = list(zip(self.amplitudes, self.omegas, self.phases_rad, strict=True))
+        constant = self.slope / plant.gain if plant.integrators == 1 else 0.0
+        if plant.integrators == 0:
+            if self.slope:
+                return Peak(math.inf, math.inf)
+            constant = (self.offset + sum(a * math.sin(phase) for a, omega, phase in parts if omega == 0)) / plant.gain
+        return peak([response(plant, *part) for part in parts if part[1] > 0], constant)
 
     def generator(self) -> Generator:
         """Its oscillators, and a constant with its integral."""

@@ -114,7 +114,7 @@ def tracking_summary(
     reference
         r(t).
     required
-        Amplitude of the control that perfect tracking of the sinusoid needs, in the actuator's unit.
+        The most that the control of perfect tracking reaches, in the actuator's unit.
     span_s
         Length of what is called the last period below, in seconds.
 

@@ -188,7 +188,7 @@ def delay_free_scan(
     weights = usual_weights() if weights is None else weights
     usual = {name: loop_of(chapter_2(name)) for name in sets}
     jobs = [
-        (name, float(share * of.reference.required(of.design.loop_plant)), output)
+        (name, float(share * of.reference.required(of.design.loop_plant).value), output)
         for name, of in usual.items()
         for output in (0.0, of.reference.offset)
         for share in limits
@@ -212,7 +212,7 @@ def delay_free_scan(
 
 
 def _row(name: str, of: Loop, weights: Weights, limit: float, output: float) -> dict[str, object]:
-    head = {"set": name, "delay": "none", "required": of.reference.required(of.design.loop_plant)}
+    head = {"set": name, "delay": "none", "required": of.reference.required(of.design.loop_plant).value}
     return head | {"initial_output": output, "limit": limit, "weights": str(weights)} | errors(of, limit, output)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 
 import numpy as np
 import pandas as pd
@@ -15,6 +16,16 @@ from identification.files import InputError
 def number(value: float, digits: int = 3) -> str:
     """Return a number to so many significant digits."""
     return f"{value:.{digits}g}"
+
+
+def at_least(value: float, digits: int = 3) -> str:
+    """Return a lower bound to so many significant digits, rounded towards less so that it stays one."""
+    return number(float(Context(prec=digits, rounding=ROUND_FLOOR).create_decimal(value)), digits)
+
+
+def at_most(value: float, digits: int = 3) -> str:
+    """Return an upper bound to so many significant digits, rounded towards more so that it stays one."""
+    return number(float(Context(prec=digits, rounding=ROUND_CEILING).create_decimal(value)), digits)
 
 
 def fraction(value: float) -> str:
@@ -75,7 +86,7 @@ def required_input(summary: pd.DataFrame) -> str:
     limit, required = (of_run(summary, "none", column) for column in ("limit", "required"))
     verdict = "exceeds" if required > limit else "is within"
     return (
-        f"Following the reference takes an input of amplitude {number(required, 4)}, "
+        f"Following the reference takes an input that reaches {number(required, 4)}, "
         f"which {verdict} the limits of +-{number(limit, 4)}"
     )
 

@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures import panels
-from paper_figures.captions import number, of_run, promises, required_input
+from paper_figures.captions import at_least, number, of_run, promises, required_input
 from paper_figures.panels import CORRECTED, THESIS
 from paper_figures.style import COLUMN_WIDTH, styled
 
@@ -50,8 +50,8 @@ def within_reach(limit: float, required: float) -> str:
     least = 100 * (math.sin(x) - x * math.cos(x))
     verdict = "is beyond reach" if least > CLAIMED else "is not ruled out by that"
     return (
-        f"Under these limits no controller makes an integrator follow closer than {number(least)} % of the reference's "
-        f"amplitude: the text's tracking error of {CLAIMED} % {verdict}."
+        f"Under these limits no controller makes an integrator follow closer than {at_least(least)} % of the "
+        f"reference's amplitude: the text's tracking error of {CLAIMED} % {verdict}."
     )
 
 

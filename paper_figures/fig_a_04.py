@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paper_figures import panels
-from paper_figures.captions import number, only
+from paper_figures.captions import at_least, at_most, number, only
 from paper_figures.panels import CORRECTED, NONE, THESIS
 from paper_figures.style import FULL_WIDTH, LINES, styled
 
@@ -41,11 +41,12 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
         "reference in advance, by linear programs and their dual certificates; the line on it is reached by some "
         f"control. (a) The loop with dead time from rest under L = {number(rest['limit'])}: the greatest error from t0 "
         "on, within three periods. The error comes to stay within 1 % of the reference's amplitude "
-        f"{best} under the best control, {none} without anti-windup, {thesis} with the thesis's one, {corrected} with "
-        "the corrected one. (b) The loop without dead time: the greatest error of the last of twelve periods over L; "
-        f"dashed, the L that perfect tracking needs, {number(periodic['required'])}, from which on no error is forced. "
-        f"At L = {number(periodic['limit'])} no control stays below {number(periodic['periodic_lower'], 4)}, and one "
-        f"reaches {number(periodic['periodic_upper'], 4)}; without anti-windup the loop {peaks[0]}, with the thesis's "
+        f"{best} under the best control that was found, {none} without anti-windup, {thesis} with the thesis's one, "
+        f"{corrected} with the corrected one. (b) The loop without dead time: the greatest error of the last of twelve "
+        f"periods over L; dashed, the L that perfect tracking needs, {at_most(periodic['required'])}, from which on no "
+        f"error is forced. At L = {number(periodic['limit'])} no control stays below "
+        f"{at_least(periodic['periodic_lower'], 4)}, and one reaches {at_most(periodic['periodic_upper'], 4)}; without "
+        f"anti-windup the loop {peaks[0]}, with the thesis's "
         f"one it {peaks[1]}, with the corrected one it {peaks[2]}."
     )
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from identification.files import InputError
 from paper_figures import panels
-from paper_figures.captions import number
+from paper_figures.captions import at_least, number
 from paper_figures.style import FULL_WIDTH, LINES, styled
 
 TABLES: tuple[str, ...] = ("conditions", "conditions_summary")
@@ -144,8 +144,8 @@ def _chapter_2(summary: pd.DataFrame) -> str:
     least = _rows(summary, search="weights").nsmallest(1, "computed").iloc[0]
     bound = _rows(summary, search="any controller")["computed"].min()
     return (
-        f"Over the weights and initial outputs searched, the error at L = {number(least['limit'])} is at least "
-        f"{number(least['computed'])} % of the amplitude (dot), and no controller stays below {number(bound)} % (bar). "
+        f"Over the weights and initial outputs tried, the least error at L = {number(least['limit'])} is "
+        f"{number(least['computed'])} % of the amplitude (dot); no controller stays below {at_least(bound)} % (bar). "
         f"From y(0) = r(0), {_each(summary, CHAPTER_2[1:], 0.0)}."
     )
 

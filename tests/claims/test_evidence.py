@@ -246,6 +246,6 @@ def test_no_limit_gives_a_recovery_after_4_46_s_to_zero_error(outcomes: pd.DataF
 
 
 def test_the_limit_that_4_s_imply_is_near_12_96(extended_design: Design, reference: Reference):
-    required = reference.required(extended_design.loop_plant)
+    required = reference.required(extended_design.loop_plant).value
     loop = design_loop(extended_design, reference, None)
     assert limit_for_last_saturation(loop, 4.0, required, 20.0) == pytest.approx(12.96, abs=0.01)

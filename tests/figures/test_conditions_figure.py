@@ -70,7 +70,7 @@ def test_the_caption_says_the_numbers(tables: Tables) -> None:
         "misses by 19 %: 9.67 for 8.6 m, 4.5 for 4 s, 5.02 for 4.46 s",
         "misses by 75 %",
         "L = 10.62 and y(0) = 61.5 (implied set)",
-        "at least 2.88 % of the amplitude (dot), and no controller stays below 2.62 % (bar)",
+        "the least error at L = 10 is 2.88 % of the amplitude (dot); no controller stays below 2.62 % (bar)",
         "0.098 % in the last period comes at L = 10.76 (implied set)",
     ):
         assert said in text, said

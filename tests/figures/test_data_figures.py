@@ -421,7 +421,10 @@ def test_caption_of_the_floor_names_what_never_settles_and_what_diverges():
     tables["limits_extended"][["settling_upper_s", "settling_none_s"]] = np.nan
     tables["limits_delay_free"].loc[1, "peak_none"] = np.nan
     caption = module.caption(tables)
-    assert "never under the best control, never without anti-windup, after 2.44 s with the thesis's one" in caption
+    assert (
+        "never under the best control that was found, never without anti-windup, after 2.44 s with the thesis's one"
+        in caption
+    )
     assert "without anti-windup the loop diverges, with the thesis's one it reaches 27," in caption
 
 
@@ -823,6 +826,14 @@ def test_view_shows_all_but_divergence(values, scale, low, high):
 )
 def test_fractions_are_written_where_they_are_exact(value, words):
     assert captions.fraction(value) == words
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high"),
+    [(1.39384603, "1.393", "1.394"), (0.125, "0.125", "0.125"), (9.9996, "9.999", "10"), (0.0, "0", "0")],
+)
+def test_bounds_are_rounded_so_that_they_stay_bounds(value, low, high):
+    assert (captions.at_least(value, 4), captions.at_most(value, 4)) == (low, high)
 
 
 def drawn(tmp_path, name: str, tables: Mapping[str, pd.DataFrame]):
