@@ -31,6 +31,7 @@ from experiments.closed_loop import Run, simulate
 from experiments.guarantee import Guarantee, sector_text
 from experiments.saturated_loop import SaturatedLoop
 from experiments.scenarios import Reference, SampledReference
+from experiments.steady_control import response
 from identification.plant import PlantModel
 
 A_EXCURSION = 64  # samples of u between two crossings of the limits, at least
@@ -136,8 +137,8 @@ def steady_control(reference: Reference | SampledReference, plant: PlantModel, t
     steady = np.full(len(time_s), reference.slope / plant.gain)
     for amplitude, omega, phase in zip(reference.amplitudes, reference.omegas, reference.phases_rad, strict=True):
         if omega > 0:
-            phasor = amplitude * np.exp(1j * phase) / complex(plant(1j * omega))
-            steady += np.imag(phasor * np.exp(1j * omega * time_s))
+            wave = response(plant, amplitude, omega, phase)
+            steady += wave.amplitude * np.sin(omega * (time_s + plant.delay_s) + wave.phase_rad)
     return steady
 
 

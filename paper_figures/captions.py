@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 
 import numpy as np
 import pandas as pd
 
+from design.digits import lower_end, upper_end
 from experiments.guarantee import sector_text
 from experiments.metrics import settling_time
 from identification.files import InputError
@@ -20,12 +20,12 @@ def number(value: float, digits: int = 3) -> str:
 
 def at_least(value: float, digits: int = 3) -> str:
     """Return a lower bound to so many significant digits, rounded towards less so that it stays one."""
-    return number(float(Context(prec=digits, rounding=ROUND_FLOOR).create_decimal(value)), digits)
+    return number(float(lower_end(value, digits)), digits)
 
 
 def at_most(value: float, digits: int = 3) -> str:
     """Return an upper bound to so many significant digits, rounded towards more so that it stays one."""
-    return number(float(Context(prec=digits, rounding=ROUND_CEILING).create_decimal(value)), digits)
+    return number(float(upper_end(value, digits)), digits)
 
 
 def fraction(value: float) -> str:
