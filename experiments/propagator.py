@@ -28,6 +28,7 @@ Array = NDArray[Any]
 
 ROUNDING = 1e-16
 NEGLIGIBLE = 1e-14  # a term, relative to the largest value of its signal so far
+NOTHING = 1e-30  # what is smaller than this share of the largest value of its signal so far is zero
 LEAST = 24  # degree: delayed polynomials may be of higher degree than the responses
 LANES = 16  # products of rows are taken in multiples of so many columns
 
@@ -237,47 +238,3 @@ def advance(
             negligible = bound * power * reach <= (i + 2) * NEGLIGIBLE * scale[r]
         if negligible:
             break
-
-
-@njit(cache=True, nogil=True)
-def state_terms(tables: Tables, which: int, degree: int, z: Array, columns: int, size: Array) -> None:
-    """Fill size (n,) with the absolute values of x's coefficients of one degree."""
-    n = len(size)
-    for r in range(n):
-        size[r] = abs(dot(tables.terms, which, n * degree + r, z, columns))
-
-
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def following(tables: Tables, which: int, signal: int, degree: int, terms: Array) -> float:
-    """A bound on all coefficients of a signal beyond a degree, which :func:`state_terms` of that degree gives."""
-    value = 0.0
-    for r in range(len(terms)):
-        value += tables.influence[which, signal, r] * terms[r]
-    return value / (degree + 1)
-
-
-@njit(cache=True, nogil=True)
-def expand(
-    tables: Tables, which: int, signal: int, signals: int, z: Array, sizes: Array, columns: int, degree: int, most: int,
-    terms: Array, later: Array, size: Array, at: int, c: Array,
-) -> int:  # fmt: skip
-    """Fill c with a signal's coefficients until all that follow are negligible against its ``size[at]`` so far.
-
-    ``sizes`` is abs(z); ``terms`` holds the absolute values of x's coefficients of the given ``degree``, beyond which
-    delayed signals have none; ``later`` (n,) is room for those of higher degrees. Returns the degree.
-    """
-    for i in range(degree + 1):
-        c[i] = dot(tables.polynomials, which, signals * i + signal, z, columns)
-    size[at] = max(size[at], abs(c[0]))
-    negligible = max(NEGLIGIBLE * size[at], ROUNDING * dot(tables.magnitudes, which, signal, sizes, columns))
-    bound = following(tables, which, signal, degree, terms)
-    while degree < most and bound > negligible:
-        degree += 1
-        c[degree] = dot(tables.polynomials, which, signals * degree + signal, z, columns)
-        state_terms(tables, which, degree, z, columns, later)
-        bound = following(tables, which, signal, degree, later)
-    left_out = abs(c[degree])
-    while degree > 0 and left_out <= ROUNDING * size[at]:
-        degree -= 1
-        left_out += abs(c[degree])
-    return degree

@@ -17,95 +17,17 @@ from numpy.typing import NDArray
 
 from experiments.crossings import leave
 from experiments.mesh import gap, insert, shift
-from experiments.propagator import (
-    NEGLIGIBLE,
-    ROUNDING,
-    Rows,
-    Tables,
-    advance,
-    dot,
-    expand,
-    following,
-    state_terms,
-    times,
-    whole_lanes,
-)
+from experiments.propagator import NEGLIGIBLE, NOTHING, Rows, Tables, advance, dot, times, whole_lanes
+from experiments.signals import change, expand, fill, unfold
 
 Array = NDArray[Any]
 
-NOTHING = 1e-30  # what is smaller than this share of the largest value of its signal so far is zero
 BEYOND = 0.5  # of a step: how far beyond its end, where no kink is, the polynomial of a cut step is read
 TRIALS = 30  # in which what brief dead times change settles,
 SETTLED = 4.0  # of what is negligible, when it moves by no more than that
 DIVERGENT = 1e100  # a loop whose state passes this diverges
 
 COMPLETE, DIVERGED, ENDLESS, CROWDED, EVENTFUL, UNSETTLED = 0, 1, 2, 3, 4, 5
-
-
-@njit(cache=True, nogil=True)
-def fill(z: Array, n: int, k: int, j: int, c: Array, degree: int, radius: float, negligible: float) -> int:
-    """Put a delayed signal's coefficients into z but for the last, negligible ones; the degree that is left."""
-    power = radius**degree
-    while degree > 0 and abs(c[degree]) * power <= negligible:
-        degree -= 1
-        power /= radius
-    for i in range(degree + 1):
-        z[n + 1 + k * i + j] = c[i]
-    return degree
-
-
-@njit(cache=True, nogil=True)
-def unfold(
-    tables: Tables, which: int, k: int, z: Array, sizes: Array, known: int, radius: float, usual: int, size: Array,
-    negligible: Array, P: Array, terms: Array,
-) -> tuple[int, float]:  # fmt: skip
-    """Fill P (1 + k, most + 1) with the coefficients of u and Z x until all that follow are negligible up to a radius.
-
-    Parameters
-    ----------
-    tables, which
-        Of both modes, and the mode's.
-    z, known, radius
-        What the step begins with, the highest degree of a delayed signal in it, and how many steps far the polynomials
-        are read.
-    usual
-        The last step's degree, below which the end is not looked for.
-    sizes, size, negligible, terms
-        Filled with abs(z), the largest values of the signals so far, what is negligible beside them, and the absolute
-        values of x's coefficients of the last degree.
-
-    Returns
-    -------
-    degree, power
-        Of the last coefficient, and radius to that power.
-    """
-    n, signals, most = len(terms), tables.magnitudes.shape[1], P.shape[1] - 1
-    columns = whole_lanes(n + 1 + k * (known + 1))
-    for i in range(columns):
-        sizes[i] = abs(z[i])
-    for s in range(1 + k):
-        negligible[s] = ROUNDING * dot(tables.magnitudes, which, s, sizes, columns)
-    quiet, power = 0, 1.0
-    for degree in range(most + 1):
-        small = degree > known
-        upto = columns if small else whole_lanes(n + 1 + k * (degree + 1))  # of the causes of this degree
-        for s in range(1 + k):
-            c = dot(tables.polynomials, which, signals * degree + s, z, upto)
-            if degree == 0:
-                size[s] = max(size[s], abs(c))
-                negligible[s] = max(NEGLIGIBLE * size[s], negligible[s])
-            P[s, degree] = c if abs(c) > NOTHING * size[s] else 0.0
-            small = small and abs(c) * power <= negligible[s]
-        quiet = quiet + 1 if small else 0
-        if quiet > 1 and degree >= usual - 1:  # what follows may be negligible; most steps end as the last one did
-            state_terms(tables, which, degree, z, columns, terms)
-            for s in range(1 + k):
-                small = small and following(tables, which, s, degree, terms) * power <= negligible[s]
-            if small:
-                return degree, power
-        power *= radius
-    terms[:] = 0.0  # what the tables leave out is below rounding
-    return most, power / radius
 
 
 @njit(cache=True, nogil=True)
@@ -241,27 +163,13 @@ def integrate(
         radius = min(1.0, (t_next - t) / step + BEYOND)
         degree, power = unfold(tables, which, k, z, sizes, known, radius, usual, size, negligible, P, terms)
         for trial in range(TRIALS if brief.any() else 0):
-            settled, most_known = True, 0
+            settled = True
             for j in range(k):
-                if not brief[j]:
-                    most_known = max(most_known, filled[j])
-                    continue
-                for i in range(most + 1):
-                    W[i] = (P[1 + j, i] if i <= degree else 0.0) if t >= fresh[j] else past[j, i]
-                if t >= fresh[j]:
-                    shift(W, degree, -delays[j] / step, work)
-                for i in range(degree + 1):
-                    W[i] -= P[1 + j, i]
-                for i in range(most + 1):
-                    work[0, i], z[n + 1 + k * i + j] = z[n + 1 + k * i + j], 0.0
-                filled[j] = fill(z, n, k, j, W, most, radius, NEGLIGIBLE * size[1 + j])
-                change, reached = 0.0, 1.0
-                for i in range(most + 1):
-                    change += abs(z[n + 1 + k * i + j] - work[0, i]) * reached
-                    reached *= radius
-                settled = settled and change <= SETTLED * negligible[1 + j]
-                most_known = max(most_known, filled[j])
-            known = most_known
+                if brief[j]:
+                    ago = delays[j] / step if t >= fresh[j] else 0.0  # before a kink's image, what it was is known
+                    within = change(z, n, k, j, past[j], ago, P[1 + j], degree, radius, size[1 + j], filled, W, work)
+                    settled = settled and within <= SETTLED * negligible[1 + j]
+            known = filled.max()
             degree, power = unfold(tables, which, k, z, sizes, known, radius, usual, size, negligible, P, terms)
             if settled:
                 break
