@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 from design.ball import shared
 from design.block import Block
+from design.central_controller import central_controller
 from design.closed_loop import closed_loop_norm, closed_loop_poles
-from design.pick import Obstacle, Problem, SynthesisError, central_controller, is_feasible
+from design.pick import Obstacle, Problem, SynthesisError, is_feasible
 from identification.files import InputError
 
 SUBOPTIMALITY = 0.01  # the controller is the central one this far above what is proved infeasible

@@ -8,16 +8,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
-from flint import acb, acb_mat, acb_poly, arb, arb_poly, ctx
+from flint import acb, arb, arb_poly, ctx
 
 from design.ball import (
     Line,
-    UndecidedError,
     decided,
     from_roots,
-    in_x,
     line,
-    mirrored,
     negative_pivot,
     number,
     polynomial_roots,
@@ -73,7 +70,7 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class _Setting:
+class Setting:
     """The polynomials of :class:`Problem` in x, squares of moduli as polynomials in x^2, and where E is known."""
 
     line: Line
@@ -95,7 +92,7 @@ class _Setting:
 
 
 @lru_cache(maxsize=16)
-def _setting(problem: Problem, bits: int) -> _Setting:
+def setting_of(problem: Problem, bits: int) -> Setting:
     """The setting at a precision of ``bits``, which is that of the context."""
     x = line(problem.decay_rate, problem.G, problem.W1, problem.W2)
     nc, n1, n2 = shared(problem.W1.zeros, problem.W2.zeros)
@@ -108,7 +105,7 @@ def _setting(problem: Problem, bits: int) -> _Setting:
         for roots in (problem.G.poles, problem.G.zeros)
     )
     roots = tuple(right_half_plane_roots(N))
-    return _Setting(
+    return Setting(
         x,
         x.hurwitz(d1),
         x.hurwitz(d2),
@@ -142,17 +139,17 @@ def is_feasible(problem: Problem, gamma: float) -> Obstacle | bool:
     Obstacle or bool
         False where the highest precision decides nothing. The obstacle's gamma is the given one or a greater one.
     """
-    answer = decided(lambda: _judge(_setting(problem, ctx.prec), problem, gamma))
+    answer = decided(lambda: _judge(setting_of(problem, ctx.prec), problem, gamma))
     return False if answer is None else answer
 
 
-def _judge(setting: _Setting, problem: Problem, gamma: float) -> Obstacle | bool:
-    level = _level(setting, gamma)
+def _judge(setting: Setting, problem: Problem, gamma: float) -> Obstacle | bool:
+    level = level_of(setting, gamma)
     obstacle = _single_point(setting, problem, gamma, level)
     if obstacle is not None:
         return obstacle
     points = setting.points
-    pivot = negative_pivot(_pick_matrix(points, _values(setting, _nu(level))))
+    pivot = negative_pivot(pick_matrix(points, values_of(setting, nu_of(level))))
     if pivot is None:
         return True
     return Obstacle(
@@ -161,11 +158,11 @@ def _judge(setting: _Setting, problem: Problem, gamma: float) -> Obstacle | bool
     )
 
 
-def _single_point(setting: _Setting, problem: Problem, gamma: float, level: arb_poly) -> Obstacle | None:
+def _single_point(setting: Setting, problem: Problem, gamma: float, level: arb_poly) -> Obstacle | None:
     """What S and T cost at one point of the closed half plane, where that is more than gamma."""
     top = level.degree()
     if (-1) ** top * level[top] < 0:
-        constant = _level(setting, 0.0)[top] / (level - _level(setting, 0.0))[top] * -(arb(gamma) ** 2)
+        constant = level_of(setting, 0.0)[top] / (level - level_of(setting, 0.0))[top] * -(arb(gamma) ** 2)
         return _costs(constant.sqrt(), "S + T = 1 at infinite frequency")
     crossings = sorted(float((-root.real).sqrt()) for root in polynomial_roots(level) if root.imag == 0 > root.real)
     if crossings:  # simple roots: the level is negative between two of them, or before the first
@@ -195,7 +192,7 @@ def _costs(cost: arb, said: str) -> Obstacle:
     return Obstacle(math.nextafter(float(cost.lower()), 0.0), f"{said} costs {float(cost):.6g}")
 
 
-def _level(setting: _Setting, gamma: float) -> arb_poly:
+def level_of(setting: Setting, gamma: float) -> arb_poly:
     """nu nu~ as a polynomial in x^2."""
     return arb(gamma) ** 2 * setting.dc_squared * setting.N - (
         squared(setting.nc) * setting.n1_squared * setting.n2_squared
@@ -212,13 +209,13 @@ def _modulus(weight: Block, s: complex) -> arb:
     return abs(value)
 
 
-def _nu(level: arb_poly) -> arb_poly:
+def nu_of(level: arb_poly) -> arb_poly:
     """The polynomial nu without roots in the right half plane."""
     roots = [acb(-root.real, root.imag) for root in right_half_plane_roots(level) if not root.imag < 0]
     return abs(level[level.degree()]).sqrt() * from_roots(roots)
 
 
-def _values(setting: _Setting, nu: arb_poly) -> list[acb]:
+def values_of(setting: Setting, nu: arb_poly) -> list[acb]:
     """E at the points."""
     values = []
     for k, s in enumerate(setting.points):
@@ -230,80 +227,9 @@ def _values(setting: _Setting, nu: arb_poly) -> list[acb]:
     return values
 
 
-def _pick_matrix(points: Sequence[acb], values: Sequence[acb]) -> list[list[acb]]:
+def pick_matrix(points: Sequence[acb], values: Sequence[acb]) -> list[list[acb]]:
+    """(1 - e_k conj(e_l))/(s_k + conj(s_l)), shape (n, n), of points and values (n,)."""
     return [
         [(1 - e * f.conjugate()) / (s + t.conjugate()) for t, f in zip(points, values, strict=True)]
         for s, e in zip(points, values, strict=True)
     ]
-
-
-def central_controller(problem: Problem, gamma: float) -> Block | None:
-    """The controller of greatest entropy among those that bring the norm below gamma; None where rounding hides it.
-
-    Parameters
-    ----------
-    problem
-        What is minimised.
-    gamma
-        Feasible.
-
-    Notes
-    -----
-    With P the Pick matrix and P a = e the interpolant of greatest entropy is
-
-        E = sum(a_l/(s + conj(s_l)))/(1 + sum(conj(e_l) a_l/(s + conj(s_l)))),
-
-    and K = T/(1 - T)/G; what cancels in it by construction is divided out before the roots are found. It is the
-    central controller of the two Riccati equations (K. Glover and J. C. Doyle, Systems & Control Letters 11 (1988)
-    167-172).
-    """
-    return decided(lambda: _central_controller(_setting(problem, ctx.prec), problem, gamma))
-
-
-def _central_controller(setting: _Setting, problem: Problem, gamma: float) -> Block:
-    nu = _nu(_level(setting, gamma))
-    points, values = setting.points, _values(setting, nu)
-    count = len(points)
-    matrix = acb_mat(count, count, [entry for row in _pick_matrix(points, values) for entry in row])
-    try:
-        weights = matrix.solve(acb_mat(count, 1, values)).entries() if count else []
-    except ZeroDivisionError as error:
-        raise UndecidedError(str(error)) from None
-    full = acb_poly([1])
-    for s in points:
-        full *= acb_poly([s.conjugate(), 1])
-    terms = [weight * (full // acb_poly([s.conjugate(), 1])) for weight, s in zip(weights, points, strict=True)]
-    E_numerator = _real(sum(terms, acb_poly([0])))
-    E_denominator = _real(sum((e.conjugate() * term for e, term in zip(values, terms, strict=True)), full))
-
-    d1, d2, nc = setting.d1, setting.d2, setting.nc
-    T = E_numerator * d1 * nu + nc * in_x(setting.n1_squared) * mirrored(d2) * E_denominator
-    S = nc * in_x(setting.n2_squared) * mirrored(d1) * E_denominator - E_numerator * d2 * nu
-    T //= _from_points(setting.zeros) * in_x(setting.N)
-    S //= _from_points(setting.poles) * in_x(setting.N)
-    return _block(setting, problem, T, S)
-
-
-def _block(setting: _Setting, problem: Problem, T: arb_poly, S: arb_poly) -> Block:
-    """K = T/(S G) d_2/d_1 in rad/s."""
-    G, x = problem.G, setting.line
-    _, d1, d2 = shared(problem.W1.poles, problem.W2.poles)
-    d2 = [root if root.real < -x.decay_rate else complex(-2 * x.decay_rate - root.real, root.imag) for root in d2]
-    zeros, poles = ([root for root in roots if root.real <= -x.decay_rate] for roots in (G.zeros, G.poles))
-    own_zeros, own_poles = ([x.back(root) for root in polynomial_roots(factor)] for factor in (T, S))
-    K = Block(1.0, (*d2, *poles, *own_zeros)) * Block(1.0, (), (*d1, *zeros, *own_poles))  # equal numbers cancel
-    gain = T[T.degree()] / S[S.degree()] / x.gain(G)
-    return K.scaled(float(gain / x.gain(K)))
-
-
-def _from_points(points: Sequence[acb]) -> arb_poly:
-    """prod(x - point); the points are closed under conjugation."""
-    product = acb_poly([1])
-    for point in points:
-        product *= acb_poly([-point, 1])
-    return _real(product)
-
-
-def _real(polynomial: acb_poly) -> arb_poly:
-    """A polynomial with real coefficients whose arithmetic was complex."""
-    return arb_poly([coefficient.real for coefficient in polynomial.coeffs()])

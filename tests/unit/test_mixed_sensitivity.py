@@ -9,11 +9,12 @@ from scipy.linalg import block_diag, eigvals
 
 import design.mixed_sensitivity as mixed_sensitivity_module
 from design.block import Block, bound_block
+from design.central_controller import central_controller
 from design.closed_loop import closed_loop_poles
 from design.contract import Design
 from design.frequency import peak
 from design.mixed_sensitivity import mixed_sensitivity
-from design.pick import Obstacle, Problem, SynthesisError, central_controller, is_feasible
+from design.pick import Obstacle, Problem, SynthesisError, is_feasible
 from design.realization import realize
 from identification.files import InputError
 
