@@ -25,7 +25,7 @@ from design.stable_intervals import (
 from identification.files import InputError
 from identification.plant import AdditiveBound, Complex, PlantModel
 
-TAIL = 1e-6  # to which a peak's relative excess at frequencies beyond those looked at is bounded
+TAIL = 1e-5  # of a peak: what may exceed it beyond the frequencies looked at, or exceed its limit there unseen
 
 
 @dataclass(frozen=True)
@@ -228,9 +228,11 @@ def _peak(axis: AxisLoop, numerator: Terms, beyond: Callable[[float], float], li
         return combined(*axis.both(centre, half), 1.0)
 
     top = closing_omega(axis.loop, 0.0, 1.0, 0.5)
-    edges, best = axis.edges(top), Margin(limit, float("inf"))
+    edges, zero = axis.edges(top), np.zeros(1)
+    at_zero = float(np.abs(above(zero, zero).value / below(zero, zero).value)[0])
+    best = max(Margin(at_zero, 0.0), Margin(limit, float("inf")))
     while True:
-        value, at = peak(above, below, edges, best.value)
+        value, at = peak(above, below, edges, best.value * (1 + TAIL * (best.omega == np.inf)))
         if at is not None:
             best = Margin(value, at)
         if beyond(top) <= (1 + TAIL) * best.value:
