@@ -16,7 +16,8 @@ from identification.plant import Complex
 CELLS = 4_000_000  # at most, that one search may look at
 NARROW = 1e-14  # of its frequency: half the width of a cell that is no longer halved
 UNIT = 2.0**-50  # rounding of a product or sum, for each of its factors
-PRECISION = 1e-12  # to which the square of a peak is known
+PRECISION = 1e-9  # to which the square of a peak is known
+SHARPER = 1e-12  # to which it is the largest beside the place where it was found
 NEWTON = 100  # steps at most to a zero, each inside its bracket
 
 NO_ZERO, ONE_ZERO, OPEN, HALVE = range(4)  # of a cell: none; at most one; rounding hides it; look closer
@@ -283,10 +284,10 @@ def peak(numerator: Function, denominator: Function, edges: Real, best: float) -
     No point exceeds the value found by more than half :data:`PRECISION` of it. ``best`` with None is returned when
     no point exceeds that.
     """
-    least, where = best**2, None
+    least, where, width, precision = best**2, None, 0.0, PRECISION
 
     def judge(centre: Real, half: Real) -> NDArray[np.int_]:
-        nonlocal least, where
+        nonlocal least, where, width
         n, d = numerator(centre, half), denominator(centre, half)
         with np.errstate(all="ignore"):
             nearest = d.least
@@ -300,10 +301,13 @@ def peak(numerator: Function, denominator: Function, edges: Real, best: float) -
             upper = _known(upper + (steepness**2 + size * curvature) * half**2)
         at = int(np.argmax(np.nan_to_num(square, nan=-1.0)))
         if square[at] > least:
-            least, where = float(square[at]), float(centre[at])
-        return np.where(upper > (1 + PRECISION) * least, HALVE, NO_ZERO)
+            least, where, width = float(square[at]), float(centre[at]), 2 * float(half[at])
+        return np.where(upper > (1 + precision) * least, HALVE, NO_ZERO)
 
     cells(judge, edges)
+    if where is not None:
+        precision = SHARPER
+        cells(judge, np.array([max(where - width, 0.0), where + width]))
     return float(np.sqrt(least)), where
 
 

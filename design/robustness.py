@@ -93,8 +93,8 @@ class Margins:
 
     @property
     def is_guaranteed(self) -> bool:
-        """Whether the additive bound guarantees robust stability."""
-        return self.W_a_C_S.value < 1
+        """Whether the additive bound guarantees robust stability, wherever within TAIL of it the peak lies."""
+        return (1 + TAIL) * self.W_a_C_S.value < 1
 
 
 def delay_loop(design: Design, plant: PlantModel) -> DelayLoop:
