@@ -8,13 +8,15 @@ from typing import TypeVar
 
 import numpy as np
 
-from design.block import bound_block, geometric_scale, plant_block, plant_numerator
+from design.axis import HALVE, NO_ZERO, cells, first_edges
+from design.block import Block, bound_block, fastest_root, geometric_scale, plant_block, plant_numerator
 from design.contract import Design
 from design.frequency import frequency_grid
+from design.jet import jet
 from design.judgement import Judgement, judge, robust_sector
 from design.mixed_sensitivity import Infimum, Synthesis, assess, infimum
 from design.printed_optimum import least_f
-from design.quasi_polynomial import CharacteristicRoots, rightmost_roots
+from design.quasi_polynomial import CharacteristicRoots, largest_beyond, rightmost_roots
 from design.robustness import Margins, delay_loop, margins_of, responses, tracking_floor
 from design.smith_predictor import anti_windup_controller, smith_controller, stabiliser
 from identification.files import InputError
@@ -23,6 +25,7 @@ from identification.plant import AdditiveBound, PlantModel
 
 Result = TypeVar("Result")
 
+CERTAIN = 1e-9  # of a covered dead time, by which it is told too small
 ROOTS = 5  # rightmost characteristic roots that are named
 
 
@@ -148,14 +151,40 @@ def covered_delay(plant: PlantModel, bound: AdditiveBound) -> float:
     """The largest change of the dead time, in seconds, for which the plant stays within W_a; infinite if every one.
 
     |P| |exp(-j omega tau) - 1| = 2 |P| |sin(omega tau/2)| <= |W_a| at every omega. 0 where 2 |P| stays above |W_a| as
-    omega grows. No change of an integrator's gain is covered by any W_a that is finite at s = 0.
+    omega grows, and beside two integrators. No change of an integrator's gain is covered by any W_a that is finite at
+    s = 0. With r = |W_a/P| the value is the least (2/omega) arcsin(r/2) where r < 2, less :data:`CERTAIN` of it. It is
+    bounded from below on cells of omega, which are halved while the bound leaves room for less.
     """
-    P, W_a = plant_block(plant), bound_block(bound)
-    excess = W_a.relative_degree - P.relative_degree
-    if excess > 0 or (excess == 0 and abs(W_a.gain / P.gain) < 2):
+    P, W_a = plant_block(plant).without_delay(), bound_block(bound)
+    share = W_a * P.inverse()
+    if share.relative_degree > 0 or (share.relative_degree == 0 and abs(share.gain) < 2) or share.zeros.count(0) > 1:
         return 0.0
-    omega = frequency_grid(P.zeros + P.poles + W_a.zeros + W_a.poles, per_decade=200)
-    s = 1j * omega
-    share = np.abs(W_a(s) / P(s)) / 2
-    inside = share < 1
-    return float(np.min(2 / omega[inside] * np.arcsin(share[inside]), initial=np.inf))
+    top = 2 * fastest_root(share) if share.zeros + share.poles else 1.0
+    farthest = top / np.finfo(float).eps
+    while largest_beyond(share.inverse(), 0.0, top) > 0.5:
+        if top > farthest:
+            return 0.0  # |W_a| tends to 2 |P| and not from above, as far as rounding shows
+        top *= 2
+    over_s = share * Block(1.0, (), (0j,)) if 0 in share.zeros else share
+    best = np.inf
+
+    def judge(centre: np.ndarray, half: np.ndarray) -> np.ndarray:
+        nonlocal best
+        found = jet((over_s,), 0.0, centre, half)
+        if over_s is share:  # no integrator
+            least, here, at = found.least / (centre + half), np.abs(found.value) / centre, centre + half
+        else:
+            least, here, at = found.least, np.abs(found.value), centre - half
+        best = min(best, float(np.min(_shift(here, centre))))
+        return np.where(_shift(least, at) < (1 - CERTAIN) * best, HALVE, NO_ZERO)
+
+    cells(judge, first_edges(share.zeros + share.poles, top))
+    return float((1 - CERTAIN) * best)
+
+
+def _shift(ratio: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """(2/omega) arcsin(omega ratio/2), which grows with both; inf beyond the arcsine's range."""
+    x = omega * ratio / 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = np.where(x < 1, ratio * np.where(x > 0, np.arcsin(np.minimum(x, 1.0)) / x, 1.0), np.inf)
+    return np.asarray(found)

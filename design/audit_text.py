@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -12,8 +12,11 @@ from design.block import bound_block
 from design.contract import Design
 from design.digits import lower_end, upper_end
 from design.mixed_sensitivity import Infimum, Synthesis
-from design.robustness import Margin, Margins
+from design.robustness import Margins
+from design.stable_intervals import LARGEST, Interval, Margin
 from identification.plant import PlantModel
+
+NAMED = 6  # intervals of stability that are named, of each kind
 
 
 def audit_text(design: Design, found: Audit, windup: float) -> str:
@@ -36,7 +39,8 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
     else:
         roots, hidden = found.roots.roots, found.roots.hidden
         roots = np.where(np.abs(roots.imag) > found.roots.uncertainty, roots, roots.real)
-        lines.append(f"  rightmost characteristic roots  {_roots(roots[~hidden])}")
+        moved = _roots(roots[~hidden]) or f"none right of {found.roots.line:.4g} 1/s, where rounding hides them"
+        lines.append(f"  rightmost characteristic roots  {moved}")
         lines.append(f"  cancelled between the blocks    {_roots(roots[hidden]) or 'none'}")
     lines += _margin_lines(found.margins)
     lines.append(
@@ -48,7 +52,7 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
     if found.same_controller is not None:
         lines.append(f"  C_aw = C_s                      to {found.same_controller:.1g}")
     if found.with_delay is not None:
-        lines += ["", f"The same controller on the plant with its dead time of {1e3 * design.plant.delay_s:g} ms"]
+        lines += ["", f"The same controller on the plant with its dead time of {_time(design.plant.delay_s, 0.0)}"]
         lines += _margin_lines(found.with_delay)
     if found.stabiliser is not None and found.infimum is not None:
         lines += ["", "H-infinity stabiliser, ||[W1 S; W2 T]||", *_hinf_lines(found.stabiliser, found.infimum)]
@@ -69,7 +73,7 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
 
 def _plant_in_words(plant: PlantModel) -> str:
     zeros, poles = len(plant.zero_modes), len(plant.pole_modes)
-    return f"plant of gain {plant.gain:g}, {zeros} zero and {poles} pole modes, dead time {1e3 * plant.delay_s:g} ms"
+    return f"plant of gain {plant.gain:g}, {zeros} zero and {poles} pole modes, dead time {_time(plant.delay_s, 0.0)}"
 
 
 def _hinf_lines(stabiliser: Synthesis | str, infimum: Infimum | str) -> Iterable[str]:
@@ -94,7 +98,7 @@ def _interval(lower: float, upper: float) -> str:
 def _covered(delay_s: float) -> str:
     if delay_s == 0:
         return "no other dead time"
-    return "any dead time" if np.isinf(delay_s) else f"dead times off by up to {1e3 * delay_s:.4g} ms"
+    return "any dead time" if np.isinf(delay_s) else f"dead times off by up to {_time(delay_s, 0.0, 4)}"
 
 
 def _roots(roots: np.ndarray) -> str:
@@ -111,24 +115,56 @@ def _margin_lines(margins: Margins | str | None) -> Iterable[str]:
     guarantee = (
         "every plant within W_a is stable" if margins.is_guaranteed else "NO guarantee for the plants within W_a"
     )
+    gains = _intervals(margins.gains, (f"{1 / LARGEST:g} or less", f"{LARGEST:g} or more"), lambda k: f"{k:.4g}")
+    phase = "any" if margins.phase_deg.omega is None else _end(margins.phase_deg, "", lambda phi: f"{phi:.4g} deg")
+    if len(margins.phases_deg) > 1:
+        phase += f", and {_intervals(margins.phases_deg[1:], ('0', '180 deg'), lambda phi: f'{phi:.4g} deg')}"
     return [
-        f"  gain factors                    {_margin(margins.gain_down)} to {_margin(margins.gain_up)}",
-        f"  phase margin                    {_margin(margins.phase_deg, ' deg')}",
-        f"  true dead times                 {_delay(margins.delay_least_s)} to {_delay(margins.delay_greatest_s)}",
+        f"  gain factors                    {gains}",
+        f"  phase margin                    {phase}",
+        f"  true dead times                 {_delays(margins)}",
         f"  modulus margin                  {_margin(margins.modulus)}",
         f"  |W_a C S| at most               {_margin(margins.W_a_C_S)}: {guarantee}",
     ]
 
 
-def _margin(margin: Margin, unit: str = "") -> str:
-    if margin.omega is None:
-        return "any" if np.isinf(margin.value) else f"{margin.value:g}"
-    return f"{margin.value:.4g}{unit} (at {margin.omega:.4g} rad/s)"
+def _margin(margin: Margin) -> str:
+    return f"{margin.value:.4g} (at {margin.omega:.4g} rad/s)"
 
 
-def _delay(margin: Margin) -> str:
-    scaled = Margin(1e3 * margin.value, margin.omega)
-    return _margin(scaled, " ms") if margin.omega is not None else ("any" if np.isinf(margin.value) else "0")
+def _end(margin: Margin, unlimited: str, said: Callable[[float], str]) -> str:
+    return unlimited if margin.omega is None else f"{said(margin.value)} (at {margin.omega:.4g} rad/s)"
+
+
+def _intervals(intervals: Sequence[Interval], unlimited: tuple[str, str], said: Callable[[float], str]) -> str:
+    """Intervals one after the other; the first few where there are many."""
+    low, high = unlimited
+    words = [f"{_end(each.least, low, said)} to {_end(each.greatest, high, said)}" for each in intervals[:NAMED]]
+    more = len(intervals) - NAMED
+    if more > 0:
+        words.append(f"{more} more up to {_end(intervals[-1].greatest, high, said)}")
+    return " and ".join(words)
+
+
+def _delays(margins: Margins) -> str:
+    """The true dead times, in as many digits as tell the ends of the model's interval from its own dead time."""
+    own, (low, high) = margins.delay_s, margins.delays_listed_s
+    ends = [end.value for end in (margins.delay_least_s, margins.delay_greatest_s) if end.omega is not None]
+    nearest = min((abs(end - own) for end in ends if end != own), default=own)
+    digits = 4 if nearest == 0 or own == 0 else min(max(4, 2 + int(np.ceil(np.log10(own / nearest)))), 15)
+
+    def said(delay_s: float) -> str:
+        return _time(delay_s, own, digits)
+
+    words = _intervals(margins.delays_s, ("0", "any"), said)
+    if low > 0 or np.isfinite(high):
+        words += f"; those below {said(low)} and above {said(high)} were not looked at"
+    return words
+
+
+def _time(time_s: float, beside_s: float, digits: int = 6) -> str:
+    """A time in s where it or the one that it is read beside is a second or more, else in ms."""
+    return f"{time_s:.{digits}g} s" if max(time_s, beside_s) >= 1 else f"{1e3 * time_s:.{digits}g} ms"
 
 
 def _anti_windup_rows(found: Audit, windup: float) -> list[Sequence[str]]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +11,11 @@ from numpy.polynomial.chebyshev import chebder, chebvander
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, eigvals
 
+from design.axis import first_edges, turn
 from design.block import Block, geometric_scale
-from design.coprime import Real, Terms, common_denominator, evaluate
+from design.coprime import Real, Terms, evaluate
+from design.delay_loop import DelayLoop
+from design.jet import Jet, combined, delayed, jet
 from design.realization import realize
 from identification.files import InputError
 from identification.plant import Complex
@@ -22,95 +24,21 @@ ORDERS = (16, 32, 64, 128, 256, 512)  # of the discretised delay lines, tried in
 AMPLIFICATION = 1e8  # of the data's rounding by exp(-h s), beyond which no roots are looked for
 RESIDUAL = 1e-12  # of a root, relative to the terms' moduli and the root times the slope
 ITERATIONS = 60  # of Ehrlich and Aberth's method at most
-STEP = 0.5  # |f'/f| times the spacing of the points that trace f
-ROUNDING = 1e-13  # of f, relative to its terms' moduli: what stands for |f| at a root on the line
-POINTS = 200_000  # at most, on one line
-
-
-@dataclass(frozen=True)
-class DelayLoop:
-    """y = P u, u = forward (r - y) + feedback exp(-delay_s s) u: C = forward/(1 - feedback exp(-delay_s s)).
-
-    Parameters
-    ----------
-    plant
-        P with its own dead time, which may differ from the controller's.
-    forward, feedback
-        K and T_so of chapters 3 and 4, Thesis Eq. (3.31); C and 0 in chapter 2. Without dead time.
-    delay_s
-        The dead time in seconds inside the controller.
-
-    Raises InputError for a dead time where none belongs, an improper forward, or an algebraic loop.
-
-    Notes
-    -----
-    With all three blocks realised the characteristic function is
-
-        d_P d_forward d_feedback (1 - feedback exp(-delay_s s) + P forward).
-
-    What divides it whatever the dead times is *hidden*: a pole of the plant that is a zero of the controller, or
-    the other way round, and poles that forward and feedback share, which are realised twice.
-    """
-
-    plant: Block
-    forward: Block
-    feedback: Block
-    delay_s: float
-
-    def __post_init__(self) -> None:
-        if self.forward.delay_s or self.feedback.delay_s or not 0 <= self.delay_s < np.inf:
-            raise InputError(
-                f"forward and feedback have the dead times {self.forward.delay_s:g} s and {self.feedback.delay_s:g} s, "
-                f"the controller has {self.delay_s:g} s; expected 0, 0, and zero or more"
-            )
-        blocks = {"forward": (self.forward, 0), "the plant times forward": (self.open_loop, 1)}
-        for name, (block, least) in (blocks | {"feedback": (self.feedback, 1 if self.feedback.gain else 0)}).items():
-            if block.relative_degree < least:
-                raise InputError(
-                    f"{name} has {len(block.zeros)} zeros and {len(block.poles)} poles; expected {least} or more "
-                    "poles more than zeros, or the loop is algebraic"
-                )
-
-    @property
-    def open_loop(self) -> Block:
-        """P forward with P's dead time; equal poles and zeros have cancelled."""
-        return self.plant * self.forward
-
-    @property
-    def inner_loop(self) -> Block:
-        """-feedback exp(-delay_s s); equal poles and zeros have cancelled."""
-        return self.feedback * Block(-1.0, (), (), self.delay_s)
-
-    @property
-    def denominator(self) -> Block:
-        """The least common denominator of the two, a polynomial block."""
-        return common_denominator(self.open_loop, self.inner_loop)
-
-    @property
-    def characteristic(self) -> Terms:
-        """Characteristic function (3.12), (3.5), (3.27), no hidden roots: three polynomials, two of them delayed."""
-        return self.denominator, self.inner_loop * self.denominator, self.open_loop * self.denominator
-
-    @property
-    def hidden(self) -> tuple[complex, ...]:
-        """The hidden roots, exactly, with their multiplicities."""
-        roots = list(self.plant.poles + self.forward.poles + self.feedback.poles)
-        for root in self.denominator.zeros:
-            roots.remove(root)
-        return tuple(roots)
 
 
 class CharacteristicRoots(NamedTuple):
-    """Roots sorted by decreasing real part, those of multiplicity m m times; three arrays of shape (n,).
+    """Roots sorted by decreasing real part, those of multiplicity m m times; three arrays of shape (n,) and a line.
 
     ``roots`` in rad/s; ``hidden``, whether no dead time moves the root, see :class:`DelayLoop`; ``uncertainty``, the
-    distance in rad/s within which rounding hides where it is: 0 for hidden roots, relative to the root about
-    1e-15 for other simple ones and 1e-15^(1/m) for multiple ones.
+    distance in rad/s within which rounding hides where it is: 0 for hidden roots and those of a Smith predictor, which
+    are given, relative to the root about 1e-15 for other simple ones and 1e-15^(1/m) for multiple ones. Right of the
+    real part ``line`` in rad/s there are no others.
     """
 
     roots: Complex
     hidden: NDArray[np.bool_]
     uncertainty: Real
+    line: float
 
 
 def rightmost_roots(loop: DelayLoop, count: int) -> CharacteristicRoots:
@@ -131,14 +59,20 @@ def rightmost_roots(loop: DelayLoop, count: int) -> CharacteristicRoots:
 
     Notes
     -----
-    Starting values are the eigenvalues of the loop with its delay lines discretised by collocation in Chebyshev
-    points (Breda, Maset, Vermiglio, SIAM J. Sci. Comput. 27 (2005) 482), the two scalar delayed signals only. They
-    are refined together on the exact characteristic function by Newton's method in the form of Ehrlich and
+    Of a Smith predictor with its own model, :attr:`DelayLoop.is_predicted`, all roots are returned: they are those of
+    the denominator, as they were given.
+
+    Otherwise starting values are the eigenvalues of the loop with its delay lines discretised by collocation in
+    Chebyshev points (Breda, Maset, Vermiglio, SIAM J. Sci. Comput. 27 (2005) 482), the two scalar delayed signals only.
+    They are refined together on the characteristic function itself by Newton's method in the form of Ehrlich and
     Aberth, which keeps approximations of a multiple root apart, and accepted when they are as many as the
     argument principle counts right of a line just left of them.
     """
     if count < 1:
         raise InputError(f"{count} roots were asked for; expected one or more")
+    if loop.is_predicted:
+        roots = np.array(loop.denominator.zeros)
+        return _with_hidden(loop, roots, np.zeros(len(roots)), -np.inf)
     longest = max(term.delay_s for term in loop.characteristic if term.gain)
     floor = -np.log(AMPLIFICATION) / longest if longest else -np.inf
     for order in ORDERS:
@@ -148,38 +82,105 @@ def rightmost_roots(loop: DelayLoop, count: int) -> CharacteristicRoots:
         uncertainty = _uncertainty(loop.characteristic, roots)
         number, line = _cut(loop, roots, uncertainty, count, floor)
         with suppress(InputError):  # of a line too far left
-            if abs(_turns(loop, line) - number) < 0.1:
-                break
-    else:
-        raise InputError(f"{ORDERS[-1]} points a dead time do not find every root; expected shorter dead times")
+            if roots_right_of(loop, line) == number:
+                return _with_hidden(loop, roots[:number], uncertainty[:number], line)
+    fastest = max(abs(root) for term in loop.characteristic for root in term.zeros + term.poles)
+    raise InputError(
+        f"{ORDERS[-1]} points on a dead time of {longest:g} s do not tell every root where the fastest root of the "
+        f"blocks is at {fastest:g} rad/s; expected shorter dead times"
+    )
+
+
+def _with_hidden(loop: DelayLoop, roots: Complex, uncertainty: Real, line: float) -> CharacteristicRoots:
+    """These roots and the loop's hidden ones, sorted."""
     hidden = len(loop.hidden)
-    found = np.concatenate([np.array(loop.hidden, dtype=complex), roots[:number]])
-    radius = np.concatenate([np.zeros(hidden), uncertainty[:number]])
+    found = np.concatenate([np.array(loop.hidden, dtype=complex), roots])
+    radius = np.concatenate([np.zeros(hidden), uncertainty])
     by_real = np.lexsort((found.imag, -found.real))
-    return CharacteristicRoots(found[by_real], by_real < hidden, radius[by_real])
+    return CharacteristicRoots(found[by_real], by_real < hidden, radius[by_real], line)
 
 
-def roots_right_of(loop: DelayLoop, line: float) -> int:
+def roots_right_of(loop: DelayLoop, line: float, factor: complex = 1.0) -> int:
     """How many roots, hidden ones not counted, have a real part above ``line`` (rad/s), by the argument principle.
 
-    It is the number of turns about 0, along the line, of the function of :func:`normalised`, which has no poles right
-    of it and tends to 1 there. Raises InputError when a root lies on the line as far as rounding shows, or the line so
-    far left that too many roots lie right of it.
+    Parameters
+    ----------
+    loop
+        With any dead times.
+    line
+        Real part in rad/s.
+    factor
+        By which P forward is multiplied, not 0: a gain, or a rotation exp(-j phi), whose loop is not a real one.
+
+    Raises
+    ------
+    InputError
+        A root lies on the line as far as rounding shows, or the line so far left that too many roots lie right of it.
+
+    Notes
+    -----
+    The function of :func:`normalised` has no poles on and right of the line and tends to 1 there: the number is that of
+    its turns about 0 along the line. Between 0 and a frequency Omega it is followed with a bound on its slope. Beyond
+    Omega 1 - feedback exp(-delay_s s) + P forward stays right of the imaginary axis, :func:`closing_omega`, and
+    the phase of the rational factor is that of its roots.
     """
-    turns = _turns(loop, line)
-    if not abs(turns - np.round(turns)) < 0.1:
+    if loop.is_predicted and factor == 1:
+        roots = np.array(loop.denominator.zeros)
+        if np.any(roots.real == line):
+            raise InputError(f"a root lies on the line of real part {line:g} rad/s; expected a line between roots")
+        return int(np.sum(roots.real > line))
+    first, second, third = normalised(loop, line)
+    top = closing_omega(loop, line, abs(factor), 0.9)
+    edges = first_edges(tuple(root - line for root in first.zeros + first.poles), top)
+    common = min(second.delay_s, third.delay_s)
+    second, third = (replace(term, delay_s=term.delay_s - common) for term in (second, third))
+    sides = (factor,) if factor == np.conj(factor) else (factor, complex(np.conj(factor)))
+    end = np.array([top]), np.zeros(1)
+    beyond = np.sum(np.angle(1 - (np.array(first.zeros) - line) / (1j * top)))
+    beyond -= np.sum(np.angle(1 - (np.array(first.poles) - line) / (1j * top)))
+    phase = 0.0
+    for side in sides:
+
+        def followed(centre: Real, half: Real, side: complex = side) -> tuple[Jet, Jet, Jet]:
+            main, inner, outer = (jet((term,), line, centre, half) for term in (first, second, third))
+            rest = delayed(combined(inner, outer, side), common, line, centre)
+            return combined(main, rest, 1.0), main, rest
+
+        whole, main, _ = followed(*end)
+        phase += (turn(followed, edges) - np.angle(whole.value[0] / main.value[0]) - beyond) / len(sides)
+    turns = -phase / np.pi
+    if not abs(turns - np.round(turns)) < 1e-3:
         raise InputError(f"a root lies on the line of real part {line:g} rad/s; expected a line between roots")
     return int(np.round(turns))
 
 
-def _turns(loop: DelayLoop, line: float) -> float:
-    """The turns about 0 that make the number of roots right of the line; nan when it goes through 0 or near."""
-    ratio = normalised(loop, line)
-    omega = trace([ratio], line, asymptotic_omega(loop, line, 0.1))
-    values = evaluate(ratio, line + 1j * omega)[0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        steps = np.angle(values[1:] / values[:-1])
-    return float((np.angle(values[-1]) - np.sum(steps)) / np.pi) if np.all(np.abs(steps) < 1) else float("nan")
+def closing_omega(loop: DelayLoop, line: float, factor: float, level: float) -> float:
+    """A frequency in rad/s, beyond all roots, from which on |feedback| + factor |P forward| < level on the line."""
+    terms = loop.inner_loop, loop.open_loop.scaled(factor)
+    roots = np.array([root for term in terms for root in term.zeros + term.poles])
+    top = 2 * (float(np.abs(roots - line).max()) or geometric_scale(loop.denominator))
+    while not sum(largest_beyond(term, line, top) for term in terms) < level:
+        top *= 2
+    return top
+
+
+def largest_beyond(block: Block, line: float, omega: float) -> float:
+    """An upper bound of |block| on the line at and beyond ``omega`` (rad/s); inf where a root lies beyond it.
+
+    With z = x + jy and its conjugate, |j omega - z|^2 |j omega - z*|^2 = omega^4 (1 + 2 (x^2 - y^2)/omega^2 +
+    |z|^4/omega^4). The bound tends to the limit with the square of 1/omega; the block must be proper.
+    """
+
+    def squared(roots: tuple[complex, ...]) -> Real:
+        return ((np.array(roots, dtype=complex) - line) / omega) ** 2
+
+    above, below = squared(block.zeros), squared(block.poles)
+    least = 1 + 2 * np.minimum(below.real, 0.0)
+    if np.any(least <= 0):
+        return float("inf")
+    shape = np.sum(np.log1p(2 * np.maximum(above.real, 0.0) + np.abs(above) ** 2)) - np.sum(np.log(least))
+    size = np.log(abs(block.gain)) - block.relative_degree * np.log(omega) if block.gain else -np.inf
+    return float(np.exp(size + shape / 4 - block.delay_s * line))
 
 
 def normalised(loop: DelayLoop, line: float) -> Terms:
@@ -191,45 +192,6 @@ def normalised(loop: DelayLoop, line: float) -> Terms:
     poles = (complex(min(p.real, 2 * line - p.real) - 0.1 * (abs(p - line) or q), p.imag) for p in roots)
     below = Block(1.0, (), tuple(poles))
     return tuple(term * below for term in loop.characteristic)
-
-
-def trace(functions: Sequence[Terms], line: float, top: float) -> Real:
-    """Points omega, 0 to ``top`` (rad/s), at line + j omega on which each function is followed without a gap.
-
-    Between neighbours a, b |f'/f| (b - a) is at most STEP at both ends: neither a root nor a turn by a dead time hides.
-    """
-
-    def steepness(omega: Real) -> Real:
-        found = [evaluate(terms, line + 1j * omega) for terms in functions]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratios = [np.abs(slope) / np.maximum(np.abs(value), ROUNDING * size) for value, slope, size in found]
-        return np.asarray(np.nan_to_num(np.max(ratios, axis=0), nan=np.inf))
-
-    resonances = [abs(root.imag) for terms in functions for term in terms for root in term.zeros + term.poles]
-    omega = np.unique([0.0, *resonances, *np.geomspace(1e-9 * top, top, 91)])
-    omega = omega[omega <= top]
-    steep = steepness(omega)
-    while len(omega) < POINTS:
-        gaps, steeper = np.diff(omega), np.maximum(steep[1:], steep[:-1])
-        wide = (gaps > STEP / np.maximum(steeper, 1e-300)) & (gaps > 1e-9 * omega[1:] + 1e-15 * top)
-        if not np.any(wide):
-            return omega
-        at = np.flatnonzero(wide) + 1
-        middle = (omega[at] + omega[at - 1]) / 2
-        omega, steep = np.insert(omega, at, middle), np.insert(steep, at, steepness(middle))
-    raise InputError(f"more than {POINTS} points are needed to follow the loop up to {top:g} rad/s")
-
-
-def asymptotic_omega(loop: DelayLoop, line: float, size: float) -> float:
-    """A frequency in rad/s above which feedback plus P forward stay below ``size`` on the line and right of it."""
-    terms = loop.inner_loop, loop.open_loop
-    roots = np.array([root for term in terms for root in term.zeros + term.poles])
-    top = 10 * (float(np.abs(roots - line).max()) or geometric_scale(loop.denominator))
-    while True:
-        value, _, magnitude = evaluate(terms, line + 1j * top)
-        if (np.abs(value) if loop.delay_s == loop.plant.delay_s else magnitude) < size:
-            return top
-        top *= 2
 
 
 def _discretised_roots(loop: DelayLoop, order: int) -> Complex:

@@ -4,30 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from design.axis import peak
 from design.block import bound_block, plant_block
 from design.contract import Design
-from design.coprime import Real, evaluate
-from design.quasi_polynomial import DelayLoop, asymptotic_omega, normalised, roots_right_of, trace
+from design.coprime import Real, Terms
+from design.delay_loop import DelayLoop
+from design.jet import Jet, combined, jet
+from design.quasi_polynomial import closing_omega, largest_beyond, roots_right_of
+from design.stable_intervals import (
+    AxisLoop,
+    Interval,
+    Margin,
+    delay_intervals,
+    gain_intervals,
+    magnitude_crossings,
+    phase_intervals,
+)
 from identification.files import InputError
 from identification.plant import AdditiveBound, Complex, PlantModel
 
-Function = Callable[[Real], Complex]  # of omega (n,) in rad/s
-Response = Callable[[Real], Real]
-
-LARGEST = 1e3  # gain factors beyond it, or below 1/LARGEST, count as none
-BISECTIONS = 70  # halvings, or cuts by the golden section, that refine a crossing or a peak
-
-
-class Margin(NamedTuple):
-    """A margin or peak and the frequency in rad/s where it is reached; None where the loop has no such limit."""
-
-    value: float
-    omega: float | None
+TAIL = 1e-5  # of a peak: what may exceed it beyond the frequencies looked at, or exceed its limit there unseen
 
 
 @dataclass(frozen=True)
@@ -36,14 +36,18 @@ class Margins:
 
     Parameters
     ----------
-    gain_down, gain_up
-        The loop stays stable while the gain is multiplied by a factor between these; 0 and inf without a limit
-        within a factor of LARGEST.
-    phase_deg
-        The least rotation of L, forward or back, that makes the loop unstable, in degrees; inf without a limit.
-    delay_least_s, delay_greatest_s
-        The loop stays stable for true dead times of the plant between these around its own, the controller being
-        kept as it is; 0 and inf without a limit.
+    delay_s
+        The plant's own dead time in seconds.
+    gains
+        The intervals of factors by which the gain may be multiplied. They are all that there are between 1/LARGEST and
+        LARGEST; ends that are not reached within that are 0 and inf.
+    phases_deg
+        The intervals of rotations of L, forward or back, in degrees from 0 to 180; an end of inf is 180.
+    delays_s
+        The intervals of true dead times of the plant in seconds, the controller being kept as it is; 0 and inf without
+        a limit.
+    delays_listed_s
+        The dead times between which ``delays_s`` is complete: 0 and inf but for loops with half a million crossings.
     modulus
         min |1 + L| = 1/||S||.
     T_peak
@@ -54,20 +58,45 @@ class Margins:
         Hidden roots that are not in the open left half plane, see :class:`DelayLoop`; no margin sees them.
     """
 
-    gain_down: Margin
-    gain_up: Margin
-    phase_deg: Margin
-    delay_least_s: Margin
-    delay_greatest_s: Margin
+    delay_s: float
+    gains: tuple[Interval, ...]
+    phases_deg: tuple[Interval, ...]
+    delays_s: tuple[Interval, ...]
+    delays_listed_s: tuple[float, float]
     modulus: Margin
     T_peak: Margin
     W_a_C_S: Margin
     hidden: tuple[complex, ...]
 
     @property
+    def gain_down(self) -> Margin:
+        """The least factor down to which the gain may fall."""
+        return _around(self.gains, 1.0).least
+
+    @property
+    def gain_up(self) -> Margin:
+        """The greatest factor up to which the gain may rise."""
+        return _around(self.gains, 1.0).greatest
+
+    @property
+    def phase_deg(self) -> Margin:
+        """The least rotation of L, forward or back, that makes the loop unstable, in degrees."""
+        return self.phases_deg[0].greatest
+
+    @property
+    def delay_least_s(self) -> Margin:
+        """The true dead time in seconds down to which the plant's may fall."""
+        return _around(self.delays_s, self.delay_s).least
+
+    @property
+    def delay_greatest_s(self) -> Margin:
+        """The true dead time in seconds up to which the plant's may rise."""
+        return _around(self.delays_s, self.delay_s).greatest
+
+    @property
     def is_guaranteed(self) -> bool:
-        """Whether the additive bound guarantees robust stability."""
-        return self.W_a_C_S.value < 1
+        """Whether the additive bound guarantees robust stability, wherever within TAIL of it the peak lies."""
+        return (1 + TAIL) * self.W_a_C_S.value < 1
 
 
 def delay_loop(design: Design, plant: PlantModel) -> DelayLoop:
@@ -100,64 +129,48 @@ def margins_of(loop: DelayLoop, bound: AdditiveBound) -> Margins:
     InputError
         The loop is not stable or a root is on the imaginary axis, so that it has no margins.
 
+        Or the crossings of the axis and the argument principle disagree, so that none can be told.
+
     Notes
     -----
-    With L = b/a, a and b from :func:`normalised`, both finite on the axis, a loop k e^(-j phi) e^(-j omega tau) L
-    has a root at j omega where a + k e^(-j phi) e^(-j omega tau) b = 0. The frequencies where that has a solution
-    in k, phi or tau alone are zeros of Im(b/a) and of |b| - |a|. They and the peaks are looked for between the
-    points of :func:`trace` for a, b, a + b and, also where |L| is negligible, the numerator of W_a C S.
+    The ends of the intervals are the crossings of the imaginary axis, the numbers of unstable roots between them are
+    counted once more, :mod:`design.stable_intervals`. The peaks are found by branch and bound on 0 to a frequency
+    Omega, :func:`design.axis.peak`; beyond it 1 - feedback exp(-delay_s s) and 1 + L are bounded, and Omega is doubled
+    until nothing there exceeds the peak by more than TAIL of it.
     """
-    delay_s = loop.plant.delay_s
     outside = tuple(root for root in loop.hidden if root.real >= 0)
     unstable = roots_right_of(loop, 0.0) + sum(root.real > 0 for root in outside)
     if unstable:
         raise InputError(f"the loop has {unstable} roots in the right half plane; margins are those of a stable loop")
-    first, second, third = normalised(loop, 0.0)
-    control = (loop.forward * first * bound_block(bound),)
-    top = asymptotic_omega(loop, 0.0, 1 / LARGEST)
-    omega = trace([(first, second), (third,), (first, second, third)], 0.0, top)
-    fastest = max(abs(root) for root in control[0].zeros + control[0].poles)
-    omega = np.union1d(omega, trace([control], 0.0, max(top, 10 * fastest)))
+    axis = AxisLoop(loop)
+    omega, rising = magnitude_crossings(axis)
+    delays, listed = delay_intervals(axis, omega, rising)
+    W_a_F = loop.forward * bound_block(bound)
 
-    def a(omega: Real) -> Complex:
-        return evaluate((first, second), 1j * omega)[0]
+    def beyond(numerator: Callable[[float, float, float], float]) -> Callable[[float], float]:
+        """Of |numerator|/|1 + L| from the bounds of |feedback| and |P forward|."""
 
-    def b(omega: Real) -> Complex:
-        return evaluate((third,), 1j * omega)[0]
+        def bound_at(omega: float) -> float:
+            inner, outer = (largest_beyond(block, 0.0, omega) for block in (loop.inner_loop, loop.open_loop))
+            return numerator(omega, inner, outer) / (1 - inner - outer)
 
-    def closed(numerator: Function) -> Response:
-        return lambda omega: np.abs(numerator(omega) / (a(omega) + b(omega)))
+        return bound_at
 
-    def sine(omega: Real) -> Real:
-        product = b(omega) * np.conj(a(omega))
-        return np.asarray(np.imag(product) / np.maximum(np.abs(product), np.finfo(float).tiny))
-
-    def excess(omega: Real) -> Real:
-        numerator, denominator = np.abs(b(omega)), np.abs(a(omega))
-        return np.asarray((numerator - denominator) / (numerator + denominator))
-
-    turned = _zeros(sine, omega)
-    with np.errstate(divide="ignore"):
-        factors = np.abs(a(turned)) / np.abs(b(turned))
-    opposite = np.real(b(turned) * np.conj(a(turned))) < 0
-    down, up = opposite & (factors < 1) & (factors > 1 / LARGEST), opposite & (factors > 1) & (factors < LARGEST)
-
-    crossed = _zeros(excess, omega)
-    phase = np.angle(-b(crossed) * np.conj(a(crossed)))
-    greater = delay_s + np.mod(phase, 2 * np.pi) / crossed
-    less = delay_s - np.mod(-phase, 2 * np.pi) / crossed
-    causal = less >= 0
-
-    S = _peak(closed(a), omega)
+    S = _peak(axis, axis.a, beyond(lambda _, inner, outer: 1 - inner), 1.0)
     return Margins(
-        gain_down=_largest(factors[down], turned[down], 0.0),
-        gain_up=_least(factors[up], turned[up]),
-        phase_deg=_least(np.degrees(np.abs(phase)), crossed),
-        delay_least_s=_largest(less[causal], crossed[causal], 0.0),
-        delay_greatest_s=_least(greater, crossed),
+        delay_s=loop.plant.delay_s,
+        gains=gain_intervals(axis),
+        phases_deg=phase_intervals(axis, omega, rising),
+        delays_s=delays,
+        delays_listed_s=listed,
         modulus=Margin(1 / S.value, S.omega),
-        T_peak=_peak(closed(b), omega),
-        W_a_C_S=_peak(closed(lambda omega: evaluate(control, 1j * omega)[0]), omega),
+        T_peak=_peak(axis, axis.b, beyond(lambda _, inner, outer: outer), 0.0),
+        W_a_C_S=_peak(
+            axis,
+            (loop.forward * bound_block(bound) * axis.a[0],),
+            beyond(lambda omega, *_: largest_beyond(W_a_F, 0.0, omega)),
+            abs(W_a_F.gain) if W_a_F.relative_degree == 0 else 0.0,
+        ),
         hidden=outside,
     )
 
@@ -202,53 +215,28 @@ def tracking_floor(plant: PlantModel, bound: AdditiveBound, omegas: ArrayLike) -
     return float(np.max(np.abs((bound_block(bound) * inverse)(1j * at))))
 
 
-def _least(values: Real, omega: Real) -> Margin:
-    """The least of these values and its frequency; inf when there is none."""
-    if not len(values):
-        return Margin(float("inf"), None)
-    best = int(np.argmin(values))
-    return Margin(float(values[best]), float(omega[best]))
+def _around(intervals: tuple[Interval, ...], value: float) -> Interval:
+    """The interval that holds the value."""
+    return next(each for each in intervals if each.least.value <= value <= each.greatest.value)
 
 
-def _largest(values: Real, omega: Real, otherwise: float) -> Margin:
-    """The largest of these values and its frequency; ``otherwise`` when there is none."""
-    least = _least(-values, omega)
-    return Margin(otherwise if least.omega is None else -least.value, least.omega)
+def _peak(axis: AxisLoop, numerator: Terms, beyond: Callable[[float], float], limit: float) -> Margin:
+    """The largest |numerator/(a + b)| on 0 <= omega <= infinity, where it is ``limit``."""
 
+    def above(centre: Real, half: Real) -> Jet:
+        return jet(numerator, 0.0, centre, half)
 
-def _minima(function: Response, left: Real, right: Real) -> Real:
-    """Where the function is least between each pair of bounds, by trisection of all at once."""
-    for _ in range(BISECTIONS):
-        step = (right - left) * (3 - np.sqrt(5)) / 2
-        lower = function(left + step) < function(right - step)
-        left, right = np.where(lower, left, left + step), np.where(lower, right - step, right)
-    return np.asarray((left + right) / 2)
+    def below(centre: Real, half: Real) -> Jet:
+        return combined(*axis.both(centre, half), 1.0)
 
-
-def _zeros(function: Response, omega: Real) -> Real:
-    """Zeros of a function whose extremes the points ``omega`` resolve; two between neighbours are found too."""
-    values = function(omega)
-    sign, distance = np.sign(values), np.abs(values)
-    dips = 1 + np.flatnonzero((distance[1:-1] <= distance[:-2]) & (distance[1:-1] <= distance[2:]))
-    extremes = _minima(lambda at: sign[dips] * function(at), omega[dips - 1], omega[dips + 1])
-    points = np.union1d(omega, extremes)
-    values = function(points)
-    changes = np.flatnonzero(values[:-1] * values[1:] <= 0)
-    left, right, sign = points[changes], points[changes + 1], np.sign(values[changes])
-    for _ in range(BISECTIONS):
-        middle = (left + right) / 2
-        same = np.sign(function(middle)) == sign
-        left, right = np.where(same, middle, left), np.where(same, right, middle)
-    return np.asarray(left)
-
-
-def _peak(magnitude: Response, omega: Real) -> Margin:
-    """The largest value on 0 <= omega <= infinity; every local maximum of the points is refined."""
-    far = 1e6 * omega[-1]  # stands for infinity, many decades above every root
-    values = magnitude(omega)
-    tops = 1 + np.flatnonzero((values[1:-1] >= values[:-2]) & (values[1:-1] >= values[2:]))
-    refined = _minima(lambda at: -magnitude(at), omega[tops - 1], omega[tops + 1])
-    at = np.concatenate([omega, refined, [far]])
-    values = np.nan_to_num(magnitude(at), nan=np.inf)
-    best = int(np.argmax(values))
-    return Margin(float(values[best]), float(at[best]) if at[best] < far else float("inf"))
+    top = closing_omega(axis.loop, 0.0, 1.0, 0.5)
+    edges, zero = axis.edges(top), np.zeros(1)
+    at_zero = float(np.abs(above(zero, zero).value / below(zero, zero).value)[0])
+    best = max(Margin(at_zero, 0.0), Margin(limit, float("inf")))
+    while True:
+        value, at = peak(above, below, edges, best.value * (1 + TAIL * (best.omega == np.inf)))
+        if at is not None:
+            best = Margin(value, at)
+        if beyond(top) <= (1 + TAIL) * best.value:
+            return best
+        top, edges = 2 * top, np.array([top, 2 * top])

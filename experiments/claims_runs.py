@@ -9,8 +9,9 @@ from fractions import Fraction
 import numpy as np
 
 from design.block import Block
+from design.delay_loop import DelayLoop
 from design.extended import design_extended
-from design.quasi_polynomial import DelayLoop, rightmost_roots
+from design.quasi_polynomial import rightmost_roots
 from experiments.cells import UNIT, Cells
 from experiments.certificates import Samples, forced, whole
 from experiments.claims_inputs import Inputs, plant_of

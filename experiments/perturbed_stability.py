@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from design.axis import HALVE, NO_ZERO, cells
 from design.block import plant_block
 from design.contract import Design
-from design.coprime import Real, evaluate
+from design.coprime import Real
 from design.frequency import frequency_grid
-from design.quasi_polynomial import asymptotic_omega, normalised, roots_right_of, trace
+from design.jet import combined, jet
+from design.quasi_polynomial import closing_omega, largest_beyond, roots_right_of
 from design.robustness import delay_loop, responses
+from design.stable_intervals import AxisLoop
 from identification.files import InputError
 from identification.plant import Complex, PlantModel
 
-NEGLIGIBLE = 1e-3  # of |P C|: where the nominal loop is no longer traced
+NEGLIGIBLE = 1e-3  # of |T_so| + |P K|: where the nominal loop is no longer followed
 TURN = 0.7  # |f(b) - f(a)| over the lesser of |f(a)| and |f(b)| between neighbours: a turn of less than 45 degrees
 SMALL = 0.9  # of |f - 1| at both neighbours: f stays in the right half plane
 CLOSEST = 1e-10  # of omega, between points
@@ -55,15 +59,23 @@ class PerturbedLoop:
         self.loop = delay_loop(design, self.plant)
         if roots_right_of(self.loop, 0.0) or any(root.real > 0 for root in self.loop.hidden):
             raise InputError("the design's loop is not stable with its own model; expected a stable one")
-        first, second, third = normalised(self.loop, 0.0)
-        control = (self.loop.forward * first,)
-        top = asymptotic_omega(self.loop, 0.0, NEGLIGIBLE)
-        traced = trace([(first, second), (third,), (first, second, third), control], 0.0, top)
+        axis = AxisLoop(self.loop)
+        control = (self.loop.forward * axis.a[0],)
+
+        def judge(centre: Real, half: Real) -> NDArray[np.int_]:
+            whole = combined(*axis.both(centre, half), 1.0)
+            clear = whole.is_clear_of_zero & jet(control, 0.0, centre, half).is_clear_of_zero
+            return np.where(clear, NO_ZERO, HALVE)
+
+        self._top = closing_omega(self.loop, 0.0, 1.0, NEGLIGIBLE)
+        _, followed, _ = cells(judge, axis.edges(self._top))
         block = plant_block(self.plant)
         roots = (*block.zeros, *block.poles, *self.loop.forward.zeros, *self.loop.forward.poles)
-        self._omega = np.union1d(traced[1:], frequency_grid(roots, per_decade=20))
-        s = 1j * self._omega
-        self._on_grid = self.plant(s), evaluate(control, s)[0] / evaluate((first, second, third), s)[0]
+        grid = frequency_grid(roots, per_decade=20)
+        self._omega = np.union1d(followed, grid[grid < self._top])
+        none, s = np.zeros_like(self._omega), 1j * self._omega
+        whole = combined(*axis.both(self._omega, none), 1.0)
+        self._on_grid = self.plant(s), jet(control, 0.0, self._omega, none).value / whole.value
 
     def unstable_roots(self, true: PlantModel) -> int:
         """How many roots of the loop with ``true`` lie in the open right half plane.
@@ -82,7 +94,7 @@ class PerturbedLoop:
         -----
         f is followed on a grid that resolves the nominal loop and both plants; intervals are halved until f moves
         by less than 0.7 of its modulus, and the dead times' difference turns it by less than 0.7 rad, but where
-        |f - 1| < 0.9 at both ends.
+        |f - 1| < 0.9 at both ends. Beyond the grid's end |f - 1| is bounded by 0.9.
         """
         if (true.integrators, true.gain if true.integrators else 0.0) != (
             self.plant.integrators,
@@ -91,6 +103,7 @@ class PerturbedLoop:
             raise InputError("the true plant's integrators differ from the model's; expected the same, gain and all")
         modes = [*true.zero_modes, *true.pole_modes]
         near = np.concatenate([mode.omega * np.exp(min(mode.zeta, 0.1) * AROUND) for mode in modes] or [np.zeros(0)])
+        near = np.concatenate([near, self._further(true)])
         omega = np.concatenate([self._omega, near])
         plant, control = self._on_grid
         known = (true(1j * self._omega) - plant) * control
@@ -109,6 +122,19 @@ class PerturbedLoop:
             middle = (omega[wide] + omega[wide + 1]) / 2
             omega = np.insert(omega, wide + 1, middle)
             L = np.insert(L, wide + 1, self._deviation(true, middle))
+
+    def _further(self, true: PlantModel) -> Real:
+        """Frequencies beyond the grid, up to one from which on |D C S| is at most (|P_true K| + |P K|)/(1 - ...)."""
+        outer, top = plant_block(true) * self.loop.forward, self._top
+        while True:
+            inner, own, other = (
+                largest_beyond(each, 0.0, top) for each in (self.loop.inner_loop, self.loop.open_loop, outer)
+            )
+            if own + other < SMALL * (1 - inner - own):
+                break
+            top *= 2
+        turned = (top - self._top) * max(true.delay_s, self.plant.delay_s) / TURN
+        return np.linspace(self._top, top, 2 + int(turned + 20 * np.log2(top / self._top)))[1:]
 
     def _deviation(self, true: PlantModel, omega: Real) -> Complex:
         """D C S at frequencies (n,)."""

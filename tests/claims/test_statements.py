@@ -11,8 +11,9 @@ from scipy.integrate import quad
 
 from design.block import Block, plant_block, plant_denominator
 from design.contract import Design
+from design.delay_loop import DelayLoop
 from design.extended import design_extended
-from design.quasi_polynomial import DelayLoop, rightmost_roots, roots_right_of
+from design.quasi_polynomial import rightmost_roots, roots_right_of
 from design.robustness import delay_loop, margins_of
 from design.stable_interpolation import by_zeros, conditions
 from experiments import claims_runs

@@ -13,10 +13,11 @@ from design.block import Block, plant_block, plant_denominator, plant_numerator
 from design.closed_loop import closed_loop_poles
 from design.contract import Design
 from design.coprime import controller, coprime_factors, evaluate
+from design.delay_loop import DelayLoop
 from design.extended import design_extended
 from design.frequency import peak
 from design.internal_model import internal_model, reference_polynomial
-from design.quasi_polynomial import DelayLoop, rightmost_roots
+from design.quasi_polynomial import rightmost_roots
 from design.robustness import delay_loop, responses
 from design.smith_predictor import (
     FreePart,

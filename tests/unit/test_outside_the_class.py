@@ -10,8 +10,9 @@ import pytest
 from design.audit import audit, covered_delay
 from design.block import Block, plant_block
 from design.contract import Design
+from design.delay_loop import DelayLoop
 from design.extended import design_extended
-from design.quasi_polynomial import DelayLoop, roots_right_of
+from design.quasi_polynomial import roots_right_of
 from design.smith_predictor import stabiliser
 from experiments.closed_loop import simulate
 from experiments.saturated_loop import SaturatedLoop
@@ -43,9 +44,12 @@ def test_dead_times_within_the_bound(implied: IdentifiedModel) -> None:
     plant, bound = implied.plant, implied.additive_bound
     covered = covered_delay(plant, bound)
     s = 1j * np.geomspace(1e-3, 1e4, 20000)
-    for factor, inside in ((0.999, True), (1.01, False)):
+    s = np.union1d(s.imag, np.linspace(100.0, 400.0, 300_001)) * 1j  # W_a is nearest to twice |P| between the modes
+    for factor, inside in ((1.0, True), (1 + 1e-5, False)):
         moved = dataclasses.replace(plant, delay_s=plant.delay_s + factor * covered)
         assert bool(np.all(np.abs(moved(s) - plant(s)) <= np.abs(bound(s)))) == inside
+    # two integrators move P by more than any finite W_a at low frequency
+    assert covered_delay(dataclasses.replace(plant, integrators=2), bound) == 0.0
     # 2 |P| above |W_a| at high frequency leaves nothing
     assert covered_delay(plant, AdditiveBound.printed_form(0.005, 20.0, 280.0, 0.01)) == 0.0
     # every phase is covered where W_a exceeds 2 |P|

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from design.block import Block, bound_block, geometric_scale, plant_block
 from design.contract import Design
+from design.delay_loop import DelayLoop
 from design.extended import design_extended
-from design.quasi_polynomial import DelayLoop, rightmost_roots, roots_right_of
+from design.quasi_polynomial import rightmost_roots, roots_right_of
 from design.realization import realize
 from design.robustness import Margins, delay_loop, margins_of, tracking_floor
 from identification.files import InputError
