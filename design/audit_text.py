@@ -157,9 +157,8 @@ def _delays(margins: Margins) -> str:
         return _time(delay_s, own, digits)
 
     words = _intervals(margins.delays_s, ("0", "any"), said)
-    if low > 0 or np.isfinite(high):
-        words += f"; those below {said(low)} and above {said(high)} were not looked at"
-    return words
+    beyond = [f"below {said(low)}"] * (low > 0) + [f"above {said(high)}"] * bool(np.isfinite(high))
+    return words + (f"; those {' and '.join(beyond)} were not looked at" if beyond else "")
 
 
 def _time(time_s: float, beside_s: float, digits: int = 6) -> str:
