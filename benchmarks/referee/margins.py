@@ -1,0 +1,125 @@
+"""Margins by winding numbers: the factors, rotations and true dead times for which a loop is stable, holes included."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from benchmarks.referee.cases import Case, Finding
+from benchmarks.referee.factors import Loop, Real, loop_of, of_bound
+from benchmarks.referee.peaks import supremum
+from benchmarks.referee.winding import OnTheLine, around, characteristic, trail
+from design.robustness import Margins, delay_loop, margins_of
+from identification.files import InputError
+from identification.plant import PlantModel
+
+GAINS = 1e3  # the largest factor that the project looks for
+EDGE = 1e-7  # relative: the bisections here end there, those of the project are finer
+PEAK = 1e-8  # relative: a peak's value is refined to rounding on both sides
+POINTS = 80  # of a search; a hole narrower than their distance that the project does not report is not seen
+
+Stable = Callable[[float], bool]
+
+
+def check(case: Case) -> list[Finding]:
+    """Margins of a design's own loop; of a delay-free design also of its loop with the dead time."""
+    design = case.design
+    plants: list[PlantModel | None] = [None]
+    if design.kind == "delay-free" and design.plant.delay_s:
+        plants.append(design.plant)
+    findings = []
+    for plant in plants:
+        loop = loop_of(design, plant)
+        unstable = characteristic(loop).count()
+        try:
+            found = margins_of(delay_loop(design, plant or design.loop_plant), design.additive_bound)
+        except InputError:
+            if not unstable:
+                raise
+            findings.append(Finding("unstable loop refused", 0.0, 0.5))
+            continue
+        findings.append(Finding("unstable roots", float(unstable), 0.5))
+        findings += _compare(case, loop, found)
+    return findings
+
+
+def _compare(case: Case, loop: Loop, found: Margins) -> list[Finding]:
+    gains = np.geomspace(1 / GAINS, GAINS, 2 * POINTS + 1)
+    down, up = _interval(lambda gain: not characteristic(loop, gain).count(), gains, 1.0)
+    findings = [
+        Finding("gain down", _apart(found.gain_down.value, 0.0 if down == gains[0] else down), EDGE),
+        Finding("gain up", _apart(found.gain_up.value, math.inf if up == gains[-1] else up), EDGE),
+    ]
+    degrees = np.linspace(0.0, 180.0, POINTS + 1)
+    _, phase = _interval(lambda phi: not characteristic(loop, np.exp(-1j * np.radians(phi))).count(), degrees, 0.0)
+    phase = math.inf if phase == 180.0 else phase
+    findings.append(Finding("phase margin", _apart(found.phase_deg.value, phase), EDGE))
+    findings += _delays(case, loop, found)
+
+    omega = trail(loop)
+    W_a = of_bound(case.model.additive_bound)
+    wide = np.union1d(omega, around(W_a.zeros + W_a.poles, 1.0))
+    peaks = {
+        "modulus margin": (1 / found.modulus.value, lambda at: np.abs(loop.responses(at)[0]), omega),
+        "||T||": (found.T_peak.value, lambda at: np.abs(loop.responses(at)[1]), omega),
+        "||W_a C S||": (found.W_a_C_S.value, lambda at: np.abs(loop.responses(at)[2] * W_a(1j * at)), wide),
+    }
+    return findings + [
+        Finding(name, abs(value / supremum(function, points)[0] - 1), PEAK)
+        for name, (value, function, points) in peaks.items()
+    ]
+
+
+def _delays(case: Case, loop: Loop, found: Margins) -> list[Finding]:
+    """The true dead times around the loop's own, and points of our own between the ends that the project gives."""
+    own = loop.true_delay_s
+    ends = [found.delay_least_s.value, found.delay_greatest_s.value]
+    most = 3 * ends[1] if math.isfinite(ends[1]) else 100 / case.slow
+    random = case.random(11)
+    tried = np.unique(np.concatenate([np.linspace(0.0, most, 2 * POINTS), random.uniform(0.0, own, POINTS), [own]]))
+    low, high = _interval(lambda delay: not characteristic(loop, 1.0, delay).count(), tried, own)
+    scale = max(high, own)
+    return [
+        Finding("least dead time", abs(ends[0] - low) / scale, EDGE),
+        Finding("greatest dead time", _apart(ends[1], math.inf if high == tried[-1] else high), EDGE),
+    ]
+
+
+def _interval(stable: Stable, points: Real, own: float) -> tuple[float, float]:
+    """The ends of the interval around ``own`` in which the loop is stable, by bisection between the points."""
+    at = int(np.argmin(np.abs(points - own)))
+    ends = []
+    for steps in (range(at, -1, -1), range(at, len(points))):
+        inside = points[at]
+        for k in steps:
+            if not _holds(stable, float(points[k])):
+                outside = points[k]
+                while abs(outside - inside) > 1e-10 * max(abs(outside), abs(inside)):
+                    middle = (inside + outside) / 2
+                    if _holds(stable, float(middle)):
+                        inside = middle
+                    else:
+                        outside = middle
+                break
+            inside = points[k]
+        ends.append(float(inside))
+    return ends[0], ends[1]
+
+
+def _holds(stable: Stable, at: float) -> bool:
+    """Whether the loop is stable; where a root lies on the axis as far as can be seen, it is not."""
+    try:
+        return stable(at)
+    except OnTheLine:
+        return False
+
+
+def _apart(first: float, second: float) -> float:
+    """The relative difference of two numbers, one of which may have no finite value: then the other must not either."""
+    if first == second:
+        return 0.0
+    if not (math.isfinite(first) and math.isfinite(second)) or min(first, second) <= 0:
+        return math.inf
+    return abs(math.log(first / second))
