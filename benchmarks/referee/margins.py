@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from identification.plant import PlantModel
 GAINS = 1e3  # the largest factor that the project looks for
 EDGE = 1e-7  # relative: the bisections here end there, those of the project are finer
 PEAK = 1e-8  # relative: a peak's value is refined to rounding on both sides
+NEAR = 1e-6  # relative distance from an end at which both sides are counted
 POINTS = 80  # of a search; a hole narrower than their distance that the project does not report is not seen
 
 Stable = Callable[[float], bool]
@@ -47,15 +49,24 @@ def check(case: Case) -> list[Finding]:
 
 def _compare(case: Case, loop: Loop, found: Margins) -> list[Finding]:
     gains = np.geomspace(1 / GAINS, GAINS, 2 * POINTS + 1)
-    down, up = _interval(lambda gain: not characteristic(loop, gain).count(), gains, 1.0)
+
+    def with_gain(gain: float) -> bool:
+        return not characteristic(loop, gain).count()
+
+    def turned(degrees: float) -> bool:
+        return not characteristic(loop, np.exp(-1j * np.radians(degrees))).count()
+
+    down, up = _interval(with_gain, gains, 1.0)
     findings = [
         Finding("gain down", _apart(found.gain_down.value, 0.0 if down == gains[0] else down), EDGE),
         Finding("gain up", _apart(found.gain_up.value, math.inf if up == gains[-1] else up), EDGE),
     ]
     degrees = np.linspace(0.0, 180.0, POINTS + 1)
-    _, phase = _interval(lambda phi: not characteristic(loop, np.exp(-1j * np.radians(phi))).count(), degrees, 0.0)
+    _, phase = _interval(turned, degrees, 0.0)
     phase = math.inf if phase == 180.0 else phase
     findings.append(Finding("phase margin", _apart(found.phase_deg.value, phase), EDGE))
+    findings += _holes("gain factors", found.gains, with_gain, gains)
+    findings += _holes("phases", found.phases_deg, turned, degrees[1:-1])
     findings += _delays(case, loop, found)
 
     omega = trail(loop)
@@ -79,12 +90,32 @@ def _delays(case: Case, loop: Loop, found: Margins) -> list[Finding]:
     most = 3 * ends[1] if math.isfinite(ends[1]) else 100 / case.slow
     random = case.random(11)
     tried = np.unique(np.concatenate([np.linspace(0.0, most, 2 * POINTS), random.uniform(0.0, own, POINTS), [own]]))
-    low, high = _interval(lambda delay: not characteristic(loop, 1.0, delay).count(), tried, own)
+
+    def late(delay_s: float) -> bool:
+        return not characteristic(loop, 1.0, delay_s).count()
+
+    low, high = _interval(late, tried, own)
     scale = max(high, own)
     return [
+        *_holes("true dead times", found.delays_s, late, tried[1:]),
         Finding("least dead time", abs(ends[0] - low) / scale, EDGE),
         Finding("greatest dead time", _apart(ends[1], math.inf if high == tried[-1] else high), EDGE),
     ]
+
+
+def _holes(name: str, intervals: Any, stable: Stable, points: Real) -> list[Finding]:
+    """At how many points the reported intervals say the wrong thing: ours, and close to both sides of every end."""
+    if not intervals:
+        return []
+    ends = np.array([end.value for interval in intervals for end in (interval.least, interval.greatest)])
+    ends = ends[np.isfinite(ends) & (ends > points[0]) & (ends < points[-1])]
+    wrong = 0
+    for point in np.unique(np.concatenate([points, *(ends * (1 + side * NEAR) for side in (-1, 1))])):
+        if np.any(np.abs(ends - point) < NEAR / 2 * point):  # of two ends next to each other
+            continue
+        said = any(interval.least.value <= point <= interval.greatest.value for interval in intervals)
+        wrong += said != _holds(stable, float(point))
+    return [Finding(f"{name}: points that are said wrong", float(wrong), 0.5)]
 
 
 def _interval(stable: Stable, points: Real, own: float) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from numba import njit
 
 from benchmarks.referee.factors import Complex, Factors, Loop, Real, unit
 
+ROUNDING = 1e-13  # relative
 MOST_STEPS = 300_000
 SMALLEST = 1e-14  # step relative to where it is: there N cannot be told from 0
 
@@ -168,7 +169,8 @@ class QuasiPolynomial:
 def characteristic(loop: Loop, gain: complex = 1.0, true_delay_s: float | None = None) -> QuasiPolynomial:
     """D (1 - feedback exp(-delay s) + gain P forward exp(-true_delay s)), D the common denominator, cancelled.
 
-    Where feedback and P forward have the same roots to rounding and the same dead time, they are one term.
+    Where feedback and P forward have the same roots to rounding and the same dead time, they are one term; and none if
+    their gains are the same to rounding too: a controller with K = T_so/P, on its own model.
     """
     later = loop.true_delay_s if true_delay_s is None else true_delay_s
     through, feedback = loop.open, loop.feedback.reduced()
@@ -184,7 +186,8 @@ def characteristic(loop: Loop, gain: complex = 1.0, true_delay_s: float | None =
     terms = [(complex(1.0), below.zeros, 0.0)]
     inner, outer = ((below * each).reduced() for each in (feedback, through))
     if loop.delay_s == later and _same(inner.zeros, outer.zeros):
-        terms.append((complex(gain * outer.gain - inner.gain), outer.zeros, later))
+        rest = complex(gain * outer.gain - inner.gain)
+        terms.append((rest if abs(rest) > ROUNDING * abs(inner.gain) else 0j, outer.zeros, later))
     else:
         terms.append((complex(-inner.gain), inner.zeros, loop.delay_s))
         terms.append((complex(gain * outer.gain), outer.zeros, later))
