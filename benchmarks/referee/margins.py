@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,9 @@ from identification.plant import PlantModel
 GAINS = 1e3  # the largest factor that the project looks for
 EDGE = 1e-7  # relative: the bisections here end there, those of the project are finer
 PEAK = 1e-8  # relative: a peak's value is refined to rounding on both sides
+ENDS = 12  # of a list of intervals, evenly among them, of which both sides are counted
 NEAR = 1e-6  # relative distance from an end at which both sides are counted
-POINTS = 80  # of a search; a hole narrower than their distance that the project does not report is not seen
+POINTS = 48  # of a search; a hole narrower than their distance that the project does not report is not seen
 
 Stable = Callable[[float], bool]
 
@@ -50,9 +52,11 @@ def check(case: Case) -> list[Finding]:
 def _compare(case: Case, loop: Loop, found: Margins) -> list[Finding]:
     gains = np.geomspace(1 / GAINS, GAINS, 2 * POINTS + 1)
 
+    @cache
     def with_gain(gain: float) -> bool:
         return not characteristic(loop, gain).count()
 
+    @cache
     def turned(degrees: float) -> bool:
         return not characteristic(loop, np.exp(-1j * np.radians(degrees))).count()
 
@@ -91,6 +95,7 @@ def _delays(case: Case, loop: Loop, found: Margins) -> list[Finding]:
     random = case.random(11)
     tried = np.unique(np.concatenate([np.linspace(0.0, most, 2 * POINTS), random.uniform(0.0, own, POINTS), [own]]))
 
+    @cache
     def late(delay_s: float) -> bool:
         return not characteristic(loop, 1.0, delay_s).count()
 
@@ -109,8 +114,9 @@ def _holes(name: str, intervals: Any, stable: Stable, points: Real) -> list[Find
         return []
     ends = np.array([end.value for interval in intervals for end in (interval.least, interval.greatest)])
     ends = ends[np.isfinite(ends) & (ends > points[0]) & (ends < points[-1])]
+    looked_at = ends[:: 1 + len(ends) // ENDS]
     wrong = 0
-    for point in np.unique(np.concatenate([points, *(ends * (1 + side * NEAR) for side in (-1, 1))])):
+    for point in np.unique(np.concatenate([points, *(looked_at * (1 + side * NEAR) for side in (-1, 1))])):
         if np.any(np.abs(ends - point) < NEAR / 2 * point):  # of two ends next to each other
             continue
         said = any(interval.least.value <= point <= interval.greatest.value for interval in intervals)
