@@ -19,10 +19,10 @@ from identification.plant import PlantModel
 
 GAINS = 1e3  # the largest factor that the project looks for
 EDGE = 1e-7  # relative: the bisections here end there, those of the project are finer
-PEAK = 1e-8  # relative: a peak's value is refined to rounding on both sides
+PEAK = 1e-6  # relative: to this the project bounds what a peak may miss beyond the frequencies it looks at
 ENDS = 12  # of a list of intervals, evenly among them, of which both sides are counted
 NEAR = 1e-6  # relative distance from an end at which both sides are counted
-POINTS = 48  # of a search; a hole narrower than their distance that the project does not report is not seen
+POINTS = 32  # of a search; a hole narrower than their distance that the project does not report is not seen
 
 Stable = Callable[[float], bool]
 
