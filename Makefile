@@ -17,6 +17,8 @@ OUT ?= build/refit
 LIMIT ?=
 SETS ?= 200
 PLANTS ?= 200
+CASES ?= 200
+SEED ?= 1
 REFIT :=
 
 PY := .venv/bin/python
@@ -56,7 +58,7 @@ ENGINE := $(addprefix experiments/,__main__.py tables.py closed_loop.py compiled
 	propagator.py signals.py mesh.py crossings.py loops.py scenarios.py steady_control.py metrics.py)
 TRACKING := $(ENGINE) $(addprefix experiments/,tracking.py pade.py)
 
-.PHONY: help figures report refit claims test bench study lint clean
+.PHONY: help figures report refit claims test bench study referee lint clean
 help: ## say what there is
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 	@echo
@@ -86,6 +88,9 @@ bench: $(BENCH_READY) ## measure speed as ratios against peers, and the cost of 
 
 study: $(READY) ## fit hundreds of synthetic sets: success, distance from the Cramer-Rao bound, coverage, time
 	$(PY) benchmarks/identification_study.py --sets $(SETS)
+
+referee: $(READY) ## compare CASES random cases of SEED with independent numerics, all that is said of them
+	$(PY) -m benchmarks.referee --cases $(CASES) --seed $(SEED)
 
 lint: $(READY) ## check style and types
 	.venv/bin/ruff check --quiet .

@@ -60,7 +60,19 @@ def test_every_target_is_in_the_help() -> None:
     text = make("help").stdout
     assert all(
         f"\n{name} " in f"\n{text}"
-        for name in ["help", "figures", "report", "refit", "claims", "test", "bench", "lint", "clean"]
+        for name in [
+            "help",
+            "figures",
+            "report",
+            "refit",
+            "claims",
+            "test",
+            "bench",
+            "study",
+            "referee",
+            "lint",
+            "clean",
+        ]
     )
 
 
