@@ -116,7 +116,7 @@ def bound_remarks(report: BoundReport) -> list[str]:
     """Sentences on how W_a lies over the residuals."""
     first = report.touches[0]
     where = "between the lines, where only its own fit speaks," if first.between_lines else "at a line"
-    least = float(Context(prec=3, rounding=ROUND_FLOOR).create_decimal(repr(report.least_excess)))
+    least = float(Context(prec=3, rounding=ROUND_FLOOR).create_decimal(repr(float(report.least_excess))))
     return [
         f"W_a is {report.mean_excess:.3g} times the residuals' envelope on average and {report.largest_excess:.3g} "
         f"times at most; no W_a of order {report.bound.order} gets below {least:.3g}",
