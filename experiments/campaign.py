@@ -120,9 +120,10 @@ def run_chunk(campaign: Campaign, first: int, last: int) -> Columns:
         Three rows a plant, as columns:
 
         plant, anti_windup, distance
-            The number, none or thesis or corrected, and the largest |P_true - P|/|W_a|.
+            The number, none or thesis or corrected, and the largest |P_true - P|/|W_a|, see
+            :class:`experiments.uncertain_plants.Member`.
         linear_stable
-            Whether the loop without saturation is, see :class:`experiments.perturbed_stability.PerturbedLoop`.
+            Whether the loop without saturation is, as :class:`experiments.perturbed_stability.PerturbedLoop` finds.
         diverged
             Whether a signal of the run passed 1e100; then the numbers below are None.
         peak_error
