@@ -135,7 +135,7 @@ def run_chunk(campaign: Campaign, first: int, last: int) -> Columns:
             The time from which on |error| stays within 1 % of the reference's amplitude; None if that is not so all
             through the last period.
         last_saturation_s
-            Exact; None if it saturates to the end.
+            A located event, no sample; None if it saturates to the end.
         events
             How often the control crosses a limit.
         guaranteed_sector

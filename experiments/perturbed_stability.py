@@ -1,4 +1,4 @@
-"""How many unstable roots a design's loop has with another true plant, by a winding number that is followed on points."""
+"""How many unstable roots a design's loop has with another true plant, by a winding number followed on points."""
 
 from __future__ import annotations
 
