@@ -42,7 +42,8 @@ def corrected_options(command: Callable[..., None]) -> Callable[..., None]:
             type=float,
             default=SECTOR,
             show_default=True,
-            help="Corrected anti-windup: Popov sector, below 1; |u| may reach limit/(1 - sector).",
+            help="Corrected anti-windup: sector of the circle criterion, below 1; |u| may reach "
+            "(limit - sector V)/(1 - sector), V the control that the reference takes.",
         ),
         click.option(
             "--recovery",

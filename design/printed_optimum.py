@@ -1,4 +1,4 @@
-"""The printed theta1~ (2.23) of least f: by the thesis's own procedure, and over all of alpha, beta and gamma."""
+"""The printed theta1~ (2.23) of least f: by the thesis's own procedure, and by a search over alpha, beta and gamma."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from identification.plant import AdditiveBound
 def optimal_gamma(bound: AdditiveBound, alpha: float, beta: float) -> tuple[float, float]:
     """The gamma that minimises f(gamma) for given alpha and beta, and that minimum.
 
-    f is convex in gamma, being the largest of |W_a + gamma W_a h| over omega, so that the minimum is global;
+    f is convex in gamma, being the largest of |W_a + gamma W_a h| over omega, so that the minimum found is global, to
+    the tolerance of the search;
     gamma > -1 keeps the zeros of 1 + theta1~ in the open left half plane.
     """
 
@@ -58,7 +59,7 @@ def beta_grid(alpha: float) -> tuple[float, ...]:
 
 
 def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float, float]:
-    """The least f of (2.23) over alpha, beta and gamma together, no pole of theta1~ beyond a bandwidth.
+    """The least f of (2.23) found over alpha, beta and gamma together, no pole of theta1~ beyond a bandwidth.
 
     Parameters
     ----------
@@ -79,7 +80,8 @@ def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float
 
     For given alpha and beta f is convex in gamma, see :func:`optimal_gamma`. Over the two time constants it is
     not, so that a grid from 1/bandwidth to a hundred times the period of W_a's resonance gives the starts. f is
-    minimised from the two best on fixed frequencies, and from what that gives exactly.
+    minimised from the two best on fixed frequencies, and from what that gives with its peak located: a local search,
+    which proves nothing of the rest.
     """
     W_a = bound_block(bound)
     omega = frequency_grid(W_a.zeros + W_a.poles, per_decade=30)
@@ -95,7 +97,7 @@ def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float
         alpha, beta = np.exp(logarithms)
         return on_grid(float(alpha), float(beta), 1e-6)
 
-    def exact(logarithms: np.ndarray) -> float:
+    def located(logarithms: np.ndarray) -> float:
         alpha, beta = np.exp(logarithms)
         return optimal_gamma(bound, float(alpha), float(beta))[1]
 
@@ -116,7 +118,7 @@ def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float
         (on_grid(alpha, beta, 1e-3), alpha, beta) for alpha in constants for beta in constants if beta <= alpha
     )
     found = [polish(rough, np.log(start[1:]), -0.1, 200) for start in starts[:2]]
-    best = polish(exact, min(found, key=rough), -0.002, 40)
+    best = polish(located, min(found, key=rough), -0.002, 40)
     beta, alpha = sorted(float(constant) for constant in np.exp(best))
     gamma, f = optimal_gamma(bound, alpha, beta)
     return alpha, beta, gamma, f

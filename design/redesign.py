@@ -45,7 +45,7 @@ class Redesign:
 def robust_free_part(
     model: IdentifiedModel, wanted: Conditions, pairs: Sequence[tuple[float, float]], level: float
 ) -> Redesign:
-    """The latest roll-off of T_so for which ||W_a C S|| stays below a level, so that every plant within W_a is stable.
+    """The latest roll-off of T_so found that keeps ||W_a C S|| below a level: the loop is stable with all of W_a.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def robust_free_part(
     frequencies, where therefore |W_a C S| = |W_a/P| for every controller: where that exceeds 1 no controller is
     robust. Elsewhere T_so may be as small as we like, since values on the axis can be interpolated by functions that
     are small away from them. The roll-off is one family of such functions: for each number of poles the largest rate
-    that meets the level, and of these the one with the least ||S||.
+    found that meets the level, on a grid and by bisection, and of these the one with the least ||S||.
     """
     if not 0 < level < 1:
         raise InputError(f"the level of |W_a C S| is {level:g}; expected between 0 and 1")
@@ -104,8 +104,8 @@ def robust_free_part(
     if met:
         return min(met, key=lambda redesign: redesign.sensitivity)
     raise InputError(
-        f"no roll-off of up to {excess + MOST_POLES} poles brings ||W_a C S|| below {best:.4g}, and the level is "
-        f"{level:g}; expected a slower a, e and f (no controller gets below {floor:.4g})"
+        f"no roll-off tried, of up to {excess + MOST_POLES} poles, brings ||W_a C S|| below {best:.4g}, the level "
+        f"is {level:g}; expected a slower a, e and f (no controller gets below {floor:.4g})"
     )
 
 

@@ -1,4 +1,4 @@
-"""How far a plant lies from another in units of the additive bound, and how far one can go until it is 1: compiled."""
+"""How far a plant lies from another in units of the additive bound, by a grid, and how far one can go until it is 1."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _slope(factors: Factors) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _leading(factors: Factors) -> tuple[float, int]:
+def leading(factors: Factors) -> tuple[float, int]:
     """k and n of k/s^n exp(-delay s) as s -> infinity."""
     gain, _, degree, modes, rates = factors
     for k in range(len(modes)):
@@ -92,9 +92,9 @@ def at_the_ends(true: Factors, nominal: Factors, bound: Factors) -> float:
         low = abs(nominal[0] * (_slope(true) - _slope(nominal)))
     else:
         low = np.inf
-    k_true, degree = _leading(true)
-    k, _ = _leading(nominal)
-    w, degree_of_bound = _leading(bound)
+    k_true, degree = leading(true)
+    k, _ = leading(nominal)
+    w, degree_of_bound = leading(bound)
     high = abs(k_true - k) if true[1] == nominal[1] else abs(k_true) + abs(k)
     if degree > degree_of_bound:
         high = 0.0
@@ -135,7 +135,9 @@ def _refined(true: Factors, nominal: Factors, bound: Factors, omega: Array, valu
 def distance(
     true: Factors, nominal: Factors, bound: Factors, omega: Array, at_nominal: Array, at_bound: Array
 ) -> float:
-    """The largest |P_true - P|/|W_a| over all frequencies.
+    """The largest |P_true - P|/|W_a| that a grid and the refinement of its peaks find.
+
+    How far the largest over all frequencies may lie above, :mod:`experiments.distance_certificate` proves.
 
     Parameters
     ----------

@@ -120,9 +120,10 @@ def run_chunk(campaign: Campaign, first: int, last: int) -> Columns:
         Three rows a plant, as columns:
 
         plant, anti_windup, distance
-            The number, none or thesis or corrected, and the largest |P_true - P|/|W_a|.
+            The number, none or thesis or corrected, and the largest |P_true - P|/|W_a|, see
+            :class:`experiments.uncertain_plants.Member`.
         linear_stable
-            Whether the loop without saturation is, see :class:`experiments.perturbed_stability.PerturbedLoop`.
+            Whether the loop without saturation is, as :class:`experiments.perturbed_stability.PerturbedLoop` finds.
         diverged
             Whether a signal of the run passed 1e100; then the numbers below are None.
         peak_error
@@ -134,7 +135,7 @@ def run_chunk(campaign: Campaign, first: int, last: int) -> Columns:
             The time from which on |error| stays within 1 % of the reference's amplitude; None if that is not so all
             through the last period.
         last_saturation_s
-            Exact; None if it saturates to the end.
+            A located event, no sample; None if it saturates to the end.
         events
             How often the control crosses a limit.
         guaranteed_sector

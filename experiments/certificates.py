@@ -1,4 +1,4 @@
-"""What weights of errors prove of every control, and one control of the least error, all roundings included."""
+"""What weights of errors prove of every control, and what one control is proved to reach, all roundings included."""
 
 from __future__ import annotations
 

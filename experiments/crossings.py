@@ -43,8 +43,9 @@ def first_exit(g: Array, length: float) -> float:
     """The first tau in (0, length] where the polynomial g, positive at the start, becomes negative; -1 if none.
 
     Bernstein coefficients decide: without a sign change there is no root, with one there is exactly one, with
-    more the interval is halved. Nothing is sampled, so that a grazing crossing cannot fall between samples; a
-    touch without crossing, or one narrower than 1e-12 of the step, is none.
+    more the interval is halved. Nothing is sampled, so that a grazing crossing does not fall between samples. That
+    holds for the polynomial as it is represented, to the rounding of its Bernstein coefficients; a touch without
+    crossing, or one narrower than 1e-12 of the step, is none.
     """
     n = len(g) - 1
     slack = g[0]

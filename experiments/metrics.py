@@ -10,7 +10,7 @@ from experiments.closed_loop import Run
 def last_saturation(run: Run) -> float:
     """The time in seconds at which the control leaves saturation for good; NaN when it never does or diverges.
 
-    Exact: it is the last located event. 0 when the control never saturates.
+    It is the last located event of the run, no sample; 0 when the control never saturates.
     """
     if not np.isfinite(run.control[-1]):
         return float("nan")

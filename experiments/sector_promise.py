@@ -15,9 +15,10 @@ is the sector that the run needs. Let its largest value be k, and k_c the sector
     the norm of u_tilde <= the norm of v - v_s, divided by 1/k - 1/k_c                        (norms: L_2 from 0 on).
 
 So u returns to v, and with a stable theta2 the output to that of the linear loop. Nothing is promised of a run that
-needs more, and nothing where v_s itself reaches the limits. A multiplier m > 0 in Popov's condition is for a dead zone
-that does not vary with time: it promises nothing under a reference. With another true plant v and v_s are those of its
-own linear loop, and theta1~ is what :func:`design.popov.robust_loss` makes of it.
+needs more, and nothing where v_s itself reaches the limits. k and k_c are found, at times and frequencies that are
+refined around their extremes; no bound is put on what lies between. A multiplier m > 0 in Popov's condition is for a
+dead zone that does not vary with time: it promises nothing under a reference. With another true plant v and v_s are
+those of its own linear loop, and theta1~ is what :func:`design.popov.robust_loss` makes of it.
 """
 
 from __future__ import annotations

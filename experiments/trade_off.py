@@ -21,7 +21,7 @@ RECOVERIES = 9  # recovery times, from the fastest that the bandwidth leaves roo
 
 
 def trade_off_tables(design: Design, tick: Callable[[], object] = lambda: None) -> dict[str, pd.DataFrame]:
-    """The least f of the corrected class over recovery times and sectors, and the design's own compensators in it.
+    """The least f found of the corrected class over recovery times and sectors, and the design's own compensators.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def trade_off_tables(design: Design, tick: Callable[[], object] = lambda: None) 
     -------
     dict
         ``trade_off``: sector, recovery_s, f (empty where nothing meets the sector), bandwidth. ``trade_off_summary``: a
-        row for thesis, least (the best of (2.23) within the bandwidth), corrected: f, popov_sector (empty: any),
+        row for thesis, least (the best found of (2.23) within the bandwidth), corrected: f, popov_sector (empty: any),
         recovery_s, lasting_offset (of a windup of 1; empty: it grows).
     """
     facts = design.anti_windup["corrected"]

@@ -1,4 +1,4 @@
-"""Plants drawn inside the additive bound around a plant: modes, damping, gain and dead time perturbed, all checked."""
+"""Plants drawn inside the additive bound: modes, damping, gain and dead time perturbed, each proved to be inside."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from design.frequency import frequency_grid
 from experiments.additive_distance import Changes, Factors, at_the_ends, distance, moved, reach
+from experiments.distance_certificate import stays_below
 from identification.files import InputError
 from identification.plant import AdditiveBound, Mode, PlantModel
 
@@ -16,7 +17,8 @@ SHORTEST = 0.05  # of its unit, below which a dead time of 0 stays 0; of itself,
 SMALLEST = 1e-9  # of the largest change, below which none is within the bound
 FINER = 3  # points of the check for one of the search
 AROUND = np.sort(np.concatenate([[0.0], *(sign * np.geomspace(7e-3, 7e2, 61) for sign in (-1, 1))]))  # half widths
-SHRINK = 0.99
+SHRINK, MOST_SHRINK = 1e-6, 1e-2  # of the way, given up in turn until the plant is proved to be within
+ABOVE, LEAST_ABOVE = 1e-3, 1e-6  # how far the distance may lie above the largest ratio found: a share, and in any case
 TRIES = 500
 
 
@@ -29,7 +31,8 @@ class Member:
     plant
         P_true; around a plant with an integrator it has a real zero and a real pole more than P.
     distance
-        The largest |P_true - P|/|W_a| over all frequencies as it was checked, at most 1.
+        The largest |P_true - P|/|W_a| that was found. Over all frequencies it is proved to be at most 1, and higher by
+        no more than ABOVE of itself and LEAST_ABOVE.
     """
 
     plant: PlantModel
@@ -81,7 +84,7 @@ class PlantsWithin:
         modes, zeros_and_poles = _modes(plant), [*plant.real_zeros, *plant.real_poles]
         omegas = [*(mode.omega for mode, _ in modes), *zeros_and_poles] or [bound.corner]
         self._corners = np.log([min(omegas), max(omegas)])
-        self._bound = _factors(bound.gain, 0.0, 0, _modes(bound), _rates(bound))
+        self._bound = as_factors(bound)
         roots = [root for mode, _ in modes + _modes(bound) for root in mode.roots]
         roots += [complex(-rate) for rate, _ in [*_rates(plant), *_rates(bound)]]
         self._grid = frequency_grid(roots)
@@ -138,6 +141,7 @@ class PlantsWithin:
         if self.plant.delay_s == 0 and t * direction[-1] < SHORTEST * self._units[-1]:
             direction = np.append(direction[:-1], 0.0)
         nominal, changes = self._problem(corner, direction)
+        shrink = SHRINK
         for _ in range(TRIES if t > 0 else 0):
             true = moved(nominal, changes, t)
             plant = self._as_plant(true)
@@ -146,9 +150,10 @@ class PlantsWithin:
                 at_the_ends(true, nominal, self._bound),
                 self._checked(plant),
             )
-            if found <= 1:
+            if found <= 1 and stays_below(true, nominal, self._bound, min(found * (1 + ABOVE) + LEAST_ABOVE, 1.0)):
                 return Member(plant, float(found))
-            t *= SHRINK
+            t *= 1 - shrink
+            shrink = min(10 * shrink, MOST_SHRINK)
         raise InputError("no plant within the additive bound was found along a direction; expected a larger bound")
 
     def _reach(self, log_corner: float, direction: np.ndarray, most: float) -> float:
@@ -174,7 +179,7 @@ class PlantsWithin:
         return PlantModel(gain, as_modes[1], as_modes[-1], delay, integrators, as_rates[1], as_rates[-1])
 
     def _checked(self, true: PlantModel) -> float:
-        """The largest |P_true - P|/|W_a| on another, finer grid, evaluated by the plants themselves."""
+        """The largest |P_true - P|/|W_a| on another, finer grid, by the plants themselves: a check of their factors."""
         modes = [mode for mode, _ in _modes(true)]
         omega = np.concatenate([mode.omega * np.exp(min(mode.zeta, 0.02) * AROUND) for mode in modes] or [np.zeros(0)])
         worst = np.max(np.abs(true(1j * self._check) - self._on_check[0]) / self._on_check[1])
@@ -190,6 +195,12 @@ def _modes(model: PlantModel | AdditiveBound) -> list[tuple[Mode, float]]:
 
 def _rates(model: PlantModel | AdditiveBound) -> list[tuple[float, float]]:
     return [(rate, 1.0) for rate in model.real_zeros] + [(rate, -1.0) for rate in model.real_poles]
+
+
+def as_factors(model: PlantModel | AdditiveBound) -> Factors:
+    """A model as :func:`experiments.additive_distance.response` takes it."""
+    delay_s, integrators = (model.delay_s, model.integrators) if isinstance(model, PlantModel) else (0.0, 0)
+    return _factors(model.gain, delay_s, integrators, _modes(model), _rates(model))
 
 
 def _factors(

@@ -1,4 +1,4 @@
-"""An envelope -> the W_a of order n that covers it with the least largest excess, and among those the least mean."""
+"""An envelope -> a W_a of order n that covers residuals with nearly the least largest excess and then little mean."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BEYOND = np.geomspace(1.0, OUTSIDE, 21)[1:]  # times the band's edges
 BINS = 200  # equal in log frequency, each with one point to begin with and one more a round where it is needed
 ROUNDS = 12
 TIGHT = 1e-3  # share by which W_a may miss a residual or exceed the largest excess in between
-ANGLES = 128  # equal ones on the circle that a mode draws in the complex plane: no peak between them is 0.01 % higher
+ANGLES = 128  # equal ones on the circle that a mode draws in the complex plane, whose own peak they miss by 0.01 %
 ITERATIONS = 100
 PRECISION = 1e-7  # in the logarithm of the excess
 
@@ -56,7 +56,7 @@ class Points:
 
 
 def tightest(seen: Points, probe: Callable[[AdditiveBound], Points], order: int) -> tuple[AdditiveBound, float]:
-    """The W_a of :func:`fit_bound` for more points than that could take at once, and the proved limit to tightness.
+    """The W_a of :func:`fit_bound` for more points than that could take at once, and a proved limit to tightness.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def tightest(seen: Points, probe: Callable[[AdditiveBound], Points], order: int)
 
 
 def fit_bound(points: Points, order: int) -> AdditiveBound:
-    """The W_a of an order that covers the points most tightly, with the least gain.
+    """A W_a of an order that covers the points tightly, with the least gain that does.
 
     Parameters
     ----------
@@ -106,13 +106,13 @@ def fit_bound(points: Points, order: int) -> AdditiveBound:
 
     Notes
     -----
-    :func:`identification.chebyshev.least_largest_excess` gives the least largest excess there is, and its roots.
-    From these, moved to where poles and zeros may be, two searches in the logarithms of gain, frequencies and
-    dampings (sequential quadratic programming): the least largest excess again, now of an admissible W_a, then the
-    least mean over log frequency of the log excess among those that come within ALLOWANCE of it. One frequency may
-    decide the largest excess, such as a deep notch of the envelope, and leave the rest of W_a free: on six tests of
-    one plant and for order 2, the bound of least largest excess has a needle of zeta = 0.007 beside the residuals'
-    peak, and 5 % above that the mean no longer gains (zeta = 0.028).
+    :func:`identification.chebyshev.least_largest_excess` comes near the least largest excess there is and gives its
+    roots. From these, moved to where poles and zeros may be, two searches in the logarithms of gain, frequencies and
+    dampings (sequential quadratic programming, which finds local minima): for the least largest excess again, now
+    of an admissible W_a, then for the least mean over log frequency of the log excess within ALLOWANCE of it. One
+    frequency may decide the largest excess, such as a deep notch of the envelope, and leave the rest of W_a free: on
+    six tests of one plant and for order 2, the bound of least largest excess has a needle of zeta = 0.007 beside the
+    residuals' peak, and 5 % above that the mean no longer gains (zeta = 0.028).
 
     Beyond the band, where nothing was measured, |W_a| may exceed the envelope's continuation, in proportion to
     omega above and to 1/omega below, by no more than it exceeds the envelope: no resonance goes where no data are.
@@ -202,7 +202,7 @@ def _search(
     slack: Callable[[Real], Real],
     slack_slope: Callable[[Real], Real],
 ) -> Real:
-    """Where the cost is least and no slack negative, both nearly."""
+    """A local minimum of the cost where no slack is negative, both nearly."""
     constraint: Any = {"type": "ineq", "fun": slack, "jac": slack_slope}
     found = minimize(
         cost,

@@ -31,9 +31,14 @@ class Envelope:
     level: Real
 
     def __call__(self, omega: Real) -> Real:
-        """The level at omega (M,) rad/s; zero outside the residuals' band."""
-        held = np.exp(np.interp(np.log(omega), np.log(self.omega), np.log(self.level)))
-        return np.where((omega >= self.omega[0]) & (omega <= self.omega[-1]), held, 0.0)
+        """The level at omega (M,) rad/s, without rounding at its own frequencies; zero outside the residuals' band."""
+        last = self.omega.size - 1
+        before = np.clip(np.searchsorted(self.omega, omega, side="right") - 1, 0, last)
+        after = np.minimum(before + 1, last)
+        width = np.where(after > before, np.log(self.omega[after] / self.omega[before]), 1.0)
+        inside = (omega >= self.omega[0]) & (omega <= self.omega[last])
+        share = np.where(inside, np.log(omega / self.omega[before]) / width, 0.0)
+        return np.where(inside, self.level[before] * (self.level[after] / self.level[before]) ** share, 0.0)
 
 
 def envelope_of(omega: Real, residual: Real) -> Envelope:

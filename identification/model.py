@@ -24,7 +24,7 @@ class IdentifiedModel:
     plant
         The nominal model P(s).
     additive_bound
-        W_a(s), at least as large as the distance between P and every test.
+        W_a(s), at every line at least as large as the distance between P and every test.
     standard_errors
         One standard error for each parameter, in the shape of the ``plant`` object of model.json and in the
         parameters' own units; None when the parameters were not estimated (the thesis's printed sets).

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from decimal import ROUND_FLOOR, Context
 from typing import Any
 
 from identification.fit import FitResult
@@ -115,9 +116,10 @@ def bound_remarks(report: BoundReport) -> list[str]:
     """Sentences on how W_a lies over the residuals."""
     first = report.touches[0]
     where = "between the lines, where only its own fit speaks," if first.between_lines else "at a line"
+    least = float(Context(prec=3, rounding=ROUND_FLOOR).create_decimal(repr(float(report.least_excess))))
     return [
         f"W_a is {report.mean_excess:.3g} times the residuals' envelope on average and {report.largest_excess:.3g} "
-        f"times at most; no W_a of order {report.bound.order} gets below {report.least_excess:.3g}",
+        f"times at most; no W_a of order {report.bound.order} gets below {least:.3g}",
         f"it touches the residual of {first.test} {where} at {first.omega:.4g} rad/s",
     ]
 

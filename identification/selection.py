@@ -1,4 +1,4 @@
-"""Which structure the data ask for: that of least Bayesian information criterion, from simple to rich and back."""
+"""Which structure the data ask for: of those tried from simple to rich and back that of least Bayesian criterion."""
 
 from __future__ import annotations
 

@@ -75,9 +75,11 @@ class BoundReport:
         At least |P - test| at every line of every test, and at least the distance between P and the test's own fit
         on a grid between the lines.
     largest_excess, mean_excess
-        Of |W_a| over the envelope of all residuals, at lines and between them.
+        Of |W_a| over the envelope of all residuals, at the lines, at the frequencies between them where W_a is fitted,
+        and around its own modes.
     least_excess
-        No W_a of this order has a smaller largest excess, as linear programs prove to rounding; 1 says nothing.
+        No W_a of this order that covers the residuals has a smaller largest excess, as multipliers prove in ball
+        arithmetic for the residuals and envelope as computed; 1 says nothing.
     at_lines, between_lines
         Over the envelope of the tests' residuals at their lines, and over that of their fits' distances between the
         lines; the latter is None without fits, or when none differs from P.
@@ -110,7 +112,7 @@ def bound_residuals(
     models: Sequence[PlantModel] | None = None,
     order: int = 2,
 ) -> BoundReport:
-    """W_a that covers |P - test| at every line, and between lines as far as the tests' fits say something.
+    """W_a that covers |P - test| at every line, and on a grid between lines as far as the tests' fits say something.
 
     At the lines this is Thesis Eq. (2.21).
 
@@ -180,7 +182,8 @@ def bound_residuals(
     bound, least_excess = tightest(seen, probe, order)
     gaps = _sample([_apart(plant, *pair, _peaks(bound, plant, *pair, around(*pair, bound))) for pair in pairs])
     bound, touches = _touching(bound, lines, gaps, [test.name for test in tests])
-    over = _excess(bound, seen.omega, seen.envelope)
+    every = seen.joined(probe(bound))
+    over = _excess(bound, every.omega, every.envelope)
     apart = [_excess(bound, envelope.omega, envelope.level) for envelope in envelopes]
     return BoundReport(
         bound=bound,
@@ -212,7 +215,7 @@ def _apart(plant: PlantModel, test: FrequencyResponse, model: PlantModel, omega:
 
 
 def _peaks(bound: AdditiveBound, plant: PlantModel, test: FrequencyResponse, model: PlantModel, omega: Real) -> Real:
-    """``omega`` and what is between where |P - P_test|/|W_a| is largest: the peaks themselves, to rounding."""
+    """``omega`` and what is between where |P - P_test|/|W_a| is largest there: the peaks that ``omega`` shows."""
     zoomed = np.unique(omega)
     for _ in range(ZOOMS):
         zoomed, distance = _apart(plant, test, model, zoomed)

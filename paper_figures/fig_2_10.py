@@ -28,7 +28,7 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
         f"Eq. (2.23) and alpha = {fraction(only(summary, 'alpha'))} s, which cancels the zero of W_a (thesis Fig. "
         f"2.10); f(0) = ||W_a||_inf for all, and dots mark the least values: {least}. The text takes "
         f"its beta from such curves; here that is beta = {fraction(only(summary, 'beta'))} s, the best of this coarse "
-        f"grid. Over a continuous beta the least is f = {number(only(summary, 'f_best'), 4)} at beta = "
+        f"grid. Over a continuous beta the least found is f = {number(only(summary, 'f_best'), 4)} at beta = "
         f"{number(only(summary, 'beta_best'))} s, gamma = {number(only(summary, 'gamma_best'))}. The text speaks of "
         "values of beta from 0 to 1 without naming those that are drawn."
     )

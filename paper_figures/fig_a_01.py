@@ -21,15 +21,13 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     slow = table[table["recovery_s"] == table["recovery_s"].max()]
     flat = "; ".join(f"{number(row.f)} for k = {number(row.sector)}" for row in slow.itertuples())
     return (
-        "The least f = ||W_a (1 + theta1~)||_inf of an anti-windup whose theta2 is stable (theta1~(0) = -1), over the "
-        "time "
-        "in which y_d falls to 1 %, for several sectors k of Popov's condition; no pole of theta1~ is faster than "
-        f"{number(float(table['bandwidth'].iloc[0]))} rad/s (not in the thesis). A dead zone lies in the sector k as "
-        "long "
-        "as |u| stays below 1/(1 - k) times the limits. A recovery that leaves little room below this bandwidth costs "
-        f"f, as does a larger sector; for the slowest recovery f is {flat}. The dot is the design's own, f = "
-        f"{number(corrected)}. The thesis's theta1~ has f = {number(thesis)} and the best of its form {number(least)}, "
-        "and "
+        "The least f = ||W_a (1 + theta1~)||_inf found of an anti-windup whose theta2 is stable (theta1~(0) = -1), "
+        "over the time in which y_d falls to 1 %, for several sectors k of the circle criterion; no pole of theta1~ is "
+        f"faster than {number(float(table['bandwidth'].iloc[0]))} rad/s (not in the thesis). A dead zone lies in the "
+        "sector k as long as |u| stays below 1/(1 - k) times the limits and the reference takes no control in the "
+        "steady state. A recovery that leaves little room below this bandwidth costs f, as does a larger sector; for "
+        f"the slowest recovery f is {flat}. The dot is the design's own, f = {number(corrected)}. The thesis's theta1~ "
+        f"has f = {number(thesis)} and the best found of its form {number(least)}, and "
         f"both keep an offset for ever ({number(of_run(summary, 'thesis', 'lasting_offset'))} and "
         f"{number(of_run(summary, 'least', 'lasting_offset'))} for each unit of the integral of u - sat(u))."
     )

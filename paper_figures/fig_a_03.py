@@ -28,12 +28,12 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     )
     at = number(of_run(summary, "design_extended", "peak_omega"))
     if of_run(summary, "design_extended", "peak") < 1:
-        verdict = "so that every plant within W_a is stable already"
+        verdict = "so that the loop around every plant within W_a is stable already"
     else:
         verdict = "so that W_a guarantees nothing"
     return (
-        "(a) |W_a C S| with the exact dead time: below 1 at every frequency every plant within W_a is stable. The "
-        "design "
+        "(a) |W_a C S| with the exact dead time: where it is below 1 at every frequency, the loop around every plant "
+        "within W_a is stable. The design "
         f"of chapters 3 and 4 reaches {peak[0]} at {at} rad/s, {verdict}; the redesign, whose T_so rolls off as far as "
         f"that takes and meets the same tracking conditions, {peak[1]}. Dashed: |W_a/P|, which no controller gets "
         "below "

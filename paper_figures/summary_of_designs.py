@@ -103,7 +103,7 @@ def sentences(design: Design, name: str, tables: Mapping[str, pd.DataFrame]) -> 
         f"{number(corrected['recovery_s'])} s"
     )
     if name == "extended" and "f_gamma" in tables:
-        said.append(f"The least f of (2.23) over beta is {number(only(tables['f_gamma'], 'f_best'))}")
+        said.append(f"The least f of (2.23) found over beta is {number(only(tables['f_gamma'], 'f_best'))}")
     if name in tables:
         omegas = ", ".join(number(omega) for omega in design.reference_omegas)
         said.append(f"The thesis's reference at {omegas} rad/s. {required_input(tables[name])}")
@@ -121,7 +121,8 @@ def _redesign(design: Design, robustness: pd.DataFrame | None) -> str:
     least, most = (1e3 * of_run(robustness, "design_robust", f"delay_{end}_s") for end in ("least", "greatest"))
     ends = f"from {number(least)} ms" + ("" if isnan(most) else f" to {number(most)} ms")
     return (
-        f"{said}: ||W_a C S|| = {after}, where that design has {before}; below 1 every plant within W_a is stable. "
+        f"{said}: ||W_a C S|| = {after}, where that design has {before}; below 1 the loop is stable around every plant "
+        "within W_a. "
         f"True dead times {ends}, all else as modelled, leave the loop stable."
     )
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from math import floor, hypot, log10
 from typing import Any
 
+from design.digits import lower_end
 from identification.files import InputError
 from identification.frequency_response import FrequencyResponse
 from identification.model import IdentifiedModel, plant_to_dict
@@ -214,10 +215,11 @@ def _bound(model: IdentifiedModel) -> str:
         for touch in fact(facts, "touches")[:MOST_TOUCHES]
     ]
     return (
-        f"{bound_text(model.additive_bound)}: nowhere below the distance of a test from the model, "
+        f"{bound_text(model.additive_bound)}: at no line below the distance of a test from the model, nor between the "
+        "lines, as far as was looked, below that of its own fit, "
         f"{number(fact(facts, 'mean_excess'))} times their envelope on average and "
         f"{number(fact(facts, 'largest_excess'))} times at most (no bound of this order gets below "
-        f"{number(fact(facts, 'least_excess'))}). It touches {', '.join(touches)}."
+        f"{lower_end(fact(facts, 'least_excess'), 3)}). It touches {', '.join(touches)}."
     )
 
 

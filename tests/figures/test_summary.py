@@ -217,12 +217,12 @@ Student's distribution of the scatter of 2 tests
 probability below 1e-06
 noise of 1.2 % of the response
 W_a = 0.3 (1 + s/40) / (1 + 2 0.2 s/60 + (s/60)^2)
-3.25 times their envelope on average and 12.5 times at most (no bound of this order gets below 11.8)
+3.25 times their envelope on average and 12.5 times at most (no bound of this order gets below 11.7)
 It touches day_0.csv at 55.5 rad/s
 = 0.375, no stabilising controller below 0.3125. K itself is UNSTABLE
 poles of T_so -1+2j, -1-2j, -4
 gamma = 48.5 by (2.23); corrected for the sector 0.75, recovery in 1.75 s
-The least f of (2.23) over beta is 0.0312
+The least f of (2.23) found over beta is 0.0312
 exceeds the limits of +-6.5
 no anti-windup diverges
 thesis's anti-windup 0.0625 any NOT stable none to the end

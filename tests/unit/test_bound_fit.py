@@ -10,6 +10,7 @@ from identification.bound_fit import resonances
 from identification.bound_shape import Shape
 from identification.chebyshev import least_largest_excess
 from identification.envelope import envelope_of
+from identification.level_certificate import excludes
 from identification.plant import AdditiveBound, Mode
 
 Real = NDArray[np.float64]
@@ -41,6 +42,65 @@ def test_one_pole_at_three_points() -> None:
     # 1/|W_a|^2 = p + q x is at most (1, 6.25, 4) and least below these: q = 3/8, p = 5/8 touches 1 and 9
     assert least_largest_excess(omega, envelope, envelope, 1).proved == pytest.approx(
         np.sqrt(6.25 / (5 / 8 + 4 * 3 / 8)), rel=3e-3
+    )
+
+
+@pytest.mark.parametrize("share", [1e-9, -1e-9])
+def test_multipliers_prove_what_holds_and_no_more(share: float) -> None:
+    """The three points above: T = 50/17 is the least square, by multipliers 5/17 and 12/17 of x = 1 and 9."""
+    omega, level = np.array([1.0, 2.0, 3.0]), np.array([1.0, 0.4, 0.5])
+    allowed = np.sqrt(50 / 17) * (1 - share) * level
+    rng = np.random.default_rng(1)
+    lower, upper = np.array([5 / 17, 0.0, 12 / 17]), np.array([0.0, 1 + 1e-11, 0.0])
+    found = [excludes(omega, level, allowed, lower, upper, 1)]
+    for _ in range(200):
+        size = 10 ** rng.uniform(-13, 0)
+        found.append(
+            excludes(omega, level, allowed, *(np.abs(part + size * rng.normal(size=3)) for part in (lower, upper)), 1)
+        )
+    assert found[0] == (share > 0)
+    assert any(found) == (share > 0)
+
+
+def test_levels_that_an_order_keeps_without_touching_the_envelope() -> None:
+    """A residual of half the envelope everywhere: a W_a of excess 1/2 exists, so 1 is no limit."""
+    level = np.ones(BAND.size)
+    assert least_largest_excess(BAND, level / 2, level, 2).proved <= 0.5
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_no_bound_that_exists_is_excluded(seed: int) -> None:
+    """A random W_a that covers random residuals: what is proved is not above its own largest excess."""
+    rng = np.random.default_rng(seed)
+    order = 1 + seed % 8
+    omega = np.sort(10.0 ** (rng.uniform(0, rng.uniform(0.5, 4), rng.integers(5, 150)) + rng.integers(-3, 4)))
+    shape = Shape(order, float(omega[0]), float(omega[-1]))
+    magnitude = np.exp(shape.log(np.append(rng.normal(), rng.uniform(*shape.bounds[1:].T)), omega))
+    residual = magnitude * rng.uniform(rng.uniform(0, 1), 1, omega.size)
+    envelope = envelope_of(omega, residual)(omega)
+    assert least_largest_excess(omega, residual, envelope, order).proved <= np.max(magnitude / envelope) * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_one_pole_by_a_search_over_its_corner(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    omega = np.sort(10.0 ** rng.uniform(0, rng.uniform(0.5, 3), rng.integers(4, 100)))
+    residual = rng.uniform(0.01, 1, omega.size) * omega ** rng.uniform(-2, 1)
+    envelope = envelope_of(omega, residual)(omega)
+    corners = np.geomspace(omega[0] / 1e4, omega[-1] * 1e4, 20_001)
+    log = -np.log1p((omega / corners[:, None]) ** 2) / 2
+    least = np.exp(np.min(np.max(np.log(residual) - log, axis=1) + np.max(log - np.log(envelope), axis=1)))
+    assert 0.99 * least < least_largest_excess(omega, residual, envelope, 1).proved < least * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_envelope_is_not_rounded_where_it_is_given(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    omega, residual = np.sort(rng.uniform(1.0, 1e3, 300)), rng.uniform(0.0, 1.0, 300)
+    envelope = envelope_of(omega, residual)
+    np.testing.assert_array_equal(envelope(envelope.omega), envelope.level)
+    np.testing.assert_allclose(
+        envelope(omega), np.exp(np.interp(np.log(omega), np.log(envelope.omega), np.log(envelope.level))), rtol=1e-13
     )
 
 

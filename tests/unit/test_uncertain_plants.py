@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from design.audit import covered_delay
-from experiments.uncertain_plants import PlantsWithin
+from experiments.distance_certificate import stays_below
+from experiments.uncertain_plants import ABOVE, PlantsWithin, as_factors
 from identification.files import InputError
 from identification.model import IdentifiedModel
 from identification.plant import AdditiveBound, Mode, PlantModel
@@ -54,6 +55,41 @@ def test_every_plant_is_inside_and_its_distance_is_what_it_is(name: str, request
         assert found <= member.distance * (1 + 1e-6) + 1e-9
         assert found >= 0.98 * member.distance
         assert 0 < member.distance <= 1
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_a_level_is_proved_above_the_distance_and_never_below(name: str) -> None:
+    """The largest ratio by brute force, of plants inside and far outside: no level below it, any level well above."""
+    plant, bound = PLANTS[name]
+    within = PlantsWithin(plant, bound)
+    for index in range(3):
+        member = within.draw(7, index)
+        looser = replace(bound, gain=bound.gain / (1 + index))
+        models = [as_factors(model) for model in (member.plant, without_change(plant, member.plant), looser)]
+        found = brute(plant, member.plant, looser)
+        assert not any(stays_below(*models, found * (1 - share)) for share in (1e-12, 1e-9, 1e-6, 1e-3, 0.1))
+        level = member.distance * (1 + index) * (1 + ABOVE)
+        assert all(stays_below(*models, level * more) for more in (1.0, 1.1, 3.0))
+
+
+def without_change(plant: PlantModel, true: PlantModel) -> PlantModel:
+    """P with as many factors as P_true: a real zero and a real pole that cancel."""
+    if not plant.integrators:
+        return plant
+    corner = np.sqrt(true.real_zeros[-1] * true.real_poles[-1])
+    return replace(plant, real_zeros=(*plant.real_zeros, corner), real_poles=(*plant.real_poles, corner))
+
+
+@pytest.mark.parametrize("zeta", [1e-2, 1e-4, 1e-6])
+def test_a_needle_is_not_overlooked(zeta: float) -> None:
+    """k/(mode) against 0 within a constant: the largest ratio is that of the peak, k/(2 zeta sqrt(1 - zeta^2))."""
+    nominal = PlantModel(1e-30, (), (Mode(7.0, 0.3),), 0.0, 0)
+    true = PlantModel(1e-3, (), (Mode(7.0, zeta),), 0.0, 0)
+    bound = AdditiveBound(1.0, (), (), (1e6,), (1e6,))
+    models = [as_factors(model) for model in (true, nominal, bound)]
+    peak = 1e-3 / (2 * zeta * np.sqrt(1 - zeta**2))
+    assert stays_below(*models, peak * (1 + 1e-5))
+    assert not stays_below(*models, peak * (1 - 1e-9))
 
 
 @pytest.mark.parametrize("name", PLANTS)
