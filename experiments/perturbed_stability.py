@@ -94,7 +94,7 @@ class PerturbedLoop:
         -----
         f is followed on a grid that resolves the nominal loop and both plants; intervals are halved until f moves
         by less than 0.7 of its modulus, and the dead times' difference turns it by less than 0.7 rad, but where
-        |f - 1| < 0.9 at both ends. Beyond the grid's end |f - 1| is bounded by 0.9. Within the grid the number is found,
+        |f - 1| < 0.9 at both ends. Beyond the grid's end |f - 1| is bounded by 0.9. Within it the number is found,
         not proved: a turn that begins and ends between two points would be missed. Where |D C S| < 1 at all
         frequencies the number is 0 without it.
         """
