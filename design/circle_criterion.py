@@ -12,6 +12,7 @@ from design.frequency import Real, frequency_grid
 FINE = 200  # frequencies a decade before the peaks are refined
 REFINEMENTS = 8  # of each peak
 A_REFINEMENT = 17  # frequencies of each, in place of three
+ROUNDING = 1e-12  # of -Re theta1~: a height that is nearer to 1 is the 1 of theta1~(0) = -1
 
 
 def circle_sector(
@@ -53,4 +54,6 @@ def circle_sector(
         best = np.clip(np.argmax(values, axis=0), 1, A_REFINEMENT - 2)
         left, right = (np.take_along_axis(finer, best[None] + side, axis=0)[0] for side in (-1, 1))
         height = max(height, float(values.max()))
+    if abs(height - 1) <= ROUNDING:
+        return 1.0
     return float("inf") if height <= 0 else 1 / height

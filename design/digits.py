@@ -1,8 +1,11 @@
-"""A bound in so many significant digits, rounded to the side on which it stays a bound."""
+"""Numbers in so many significant digits: bounds that stay bounds, and two numbers that are told apart."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
+
+EXACT = 17  # digits, in which no two doubles are said alike
 
 
 def lower_end(value: float, digits: int) -> str:
@@ -13,6 +16,13 @@ def lower_end(value: float, digits: int) -> str:
 def upper_end(value: float, digits: int) -> str:
     """The least number of so many digits that, read as a double, is not below the value."""
     return _rounded(value, digits, ROUND_CEILING)
+
+
+def told_apart(first: float, second: float, digits: int, said: Callable[[float, int], str]) -> tuple[str, str]:
+    """Two numbers as ``said`` says them in ``digits`` significant digits, or in as many more as tell them apart."""
+    while first != second and digits < EXACT and said(first, digits) == said(second, digits):
+        digits += 1
+    return said(first, digits), said(second, digits)
 
 
 def _rounded(value: float, digits: int, rounding: str) -> str:

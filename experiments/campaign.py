@@ -125,7 +125,7 @@ def run_chunk(campaign: Campaign, first: int, last: int) -> Columns:
         linear_stable
             Whether the loop without saturation is, as :class:`experiments.perturbed_stability.PerturbedLoop` finds.
         diverged
-            Whether a signal of the run passed 1e100; then the numbers below are None.
+            Whether the control passed 1e100 times the limits; then the numbers below are None.
         peak_error
             The largest |error| after the first quarter of the period: the loop starts from rest, and before that the
             error is the reference itself, whatever the controller.

@@ -44,10 +44,13 @@ class Run:
 
 
 class DivergenceError(InputError):
-    """A signal of the loop passed 1e100, at ``time_s`` seconds."""
+    """The control passed 1e100 times the limits, or without limits a state 1e100, at ``time_s`` seconds."""
 
     def __init__(self, time_s: float) -> None:
-        super().__init__(f"the loop diverges: a signal passed 1e100 at t = {time_s:.6g} s")
+        super().__init__(
+            f"the loop diverges: the control passed 1e100 times the limits, or without limits a signal 1e100, at t = "
+            f"{time_s:.6g} s"
+        )
         self.time_s = time_s
 
 
@@ -83,8 +86,8 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
     increasing = len(time_s) > 0 and time_s[0] >= 0 and time_s[-1] > 0 and np.all(np.diff(time_s) > 0)
     if not (increasing and np.all(np.isfinite(time_s))):
         raise InputError("the sample times are not increasing finite numbers from zero on that end after zero")
-    compiled = compile_loop(loop)
     horizon = float(time_s[-1])
+    compiled = compile_loop(loop, idle_step=horizon)
     most_events, room, brief = 4096, _room(compiled), BRIEF
     while True:
         if room * compiled.tables.increments.shape[2] > MOST_ROOM:

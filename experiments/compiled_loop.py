@@ -40,13 +40,15 @@ class CompiledLoop:
     reading: np.ndarray
 
 
-def compile_loop(loop: SaturatedLoop, most_step: float = np.inf, most_brief: float = BRIEF) -> CompiledLoop:
+def compile_loop(
+    loop: SaturatedLoop, most_step: float = np.inf, most_brief: float = BRIEF, idle_step: float = 1.0
+) -> CompiledLoop:
     """Merge the delayed signals that enter the loop alike, choose the step, and tabulate it.
 
     The step is set by the fastest eigenvalue of the loop, saturated or not, and by the shortest dead time that is not
     brief, of which it is a whole part: then most delayed polynomials are read where they start. It is halved until all
     series end. A dead time is brief up to ``most_brief`` time constants of the fastest eigenvalue: the loop is taken
-    without it, and what it changes is found in each step.
+    without it, and what it changes is found in each step. Where nothing sets a step, ``idle_step`` seconds are one.
     """
     now = loop.delays == 0
     A, C = loop.A + loop.D[:, now] @ loop.Z[now], loop.C + loop.E[now] @ loop.Z[now]
@@ -68,7 +70,7 @@ def compile_loop(loop: SaturatedLoop, most_step: float = np.inf, most_brief: flo
         shortest = float(delays[~brief].min())
         step = shortest / max(np.ceil(shortest / step), 1.0)
     elif np.isinf(step):
-        step = 1.0  # of integrators alone, whose series end by themselves
+        step = idle_step  # of integrators alone, whose series end by themselves
     while True:
         both = [tabulate(rows, n, k, step) for rows in (unsaturated, saturated)]
         if all(degree >= 0 for _, degree in both):

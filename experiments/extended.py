@@ -41,8 +41,8 @@ def extended_tables(design: Design, limit: float | None = None) -> dict[str, pd.
     Notes
     -----
     Chapter 4 prints no limits. It says of the loop without anti-windup that "until around 4 seconds, the
-    system operates in the nonlinear region"; the limit is the one that comes nearest to this, see
-    :func:`usual_limit`.
+    system operates in the nonlinear region"; the limit is the one that comes nearest to this, or with a reference of
+    another frequency to the same share of its period, see :func:`usual_limit`.
     """
     reference = thesis_reference("extended", design.reference_omegas)
     required = reference.required(design.loop_plant).value
@@ -65,16 +65,31 @@ def extended_tables(design: Design, limit: float | None = None) -> dict[str, pd.
 def usual_limit(design: Design) -> float:
     """The limit +-L that an extended design is run with unless another is given.
 
+    Without anti-windup the loop leaves saturation for good nearest to :func:`desaturation`.
+
     Raises
     ------
     InputError
         There is none, see :func:`limit_for_last_saturation`.
     """
     reference = thesis_reference("extended", design.reference_omegas)
-    target = float(printed()["extended"]["desaturation_s"])
-    horizon = PERIODS * max(span(design, reference), target)
+    period = span(design, reference)
+    target, horizon = desaturation(period), PERIODS * period
     loop = design_loop(design, reference, None)
     return limit_for_last_saturation(loop, target, reference.required(design.loop_plant).value, horizon)
+
+
+def desaturation(period_s: float) -> float:
+    """The thesis's "around 4 seconds" in which the loop leaves saturation, as a share of its reference's period.
+
+    Parameters
+    ----------
+    period_s
+        Of the reference's slowest sinusoid; the printed one gives the printed time.
+    """
+    chosen = printed()["extended"]
+    own = thesis_reference("extended", [chosen["reference"]["omega"]]).period_s
+    return float(chosen["desaturation_s"]) * (period_s / own)
 
 
 def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: float, horizon_s: float) -> float:

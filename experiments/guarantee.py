@@ -106,6 +106,6 @@ def _is_within(design: Design, true: PlantModel) -> bool:
     return bool(np.all(difference <= np.abs(bound(s))))
 
 
-def sector_text(sector: float) -> str:
-    """A sector in three digits, of its distance from 1 where that is small."""
-    return f"1 - {1 - sector:.2g}" if 0.9995 <= sector < 1 else f"{sector:.3g}"
+def sector_text(sector: float, digits: int = 3) -> str:
+    """A sector in so many digits, of its distance from 1 in one less where that is small."""
+    return f"1 - {1 - sector:.{digits - 1}g}" if 0.9995 <= sector < 1 else f"{sector:.{digits}g}"

@@ -15,6 +15,7 @@ from design.stable_interpolation import Conditions, StableFunction, by_poles, by
 from identification.files import InputError
 from identification.model import number
 
+FREQUENCIES = 161
 SENSITIVITY = 2.0  # ||S|| above it, a modulus margin below 1/2, counts as a failure
 METHODS: dict[str, Callable[[Conditions], StableFunction]] = {
     "zeros": lambda wanted: by_zeros(wanted, [(2 * omega, omega**2) for omega in wanted.omegas]),
@@ -47,7 +48,7 @@ def interpolation_tables(design: Design) -> dict[str, pd.DataFrame]:
     top = max(100 * a, 3 * math.pi / delay_s if delay_s else 0.0)
     rows = [
         {"omega": omega, "method": name} | _judge(method, float(omega), delay_s, a)
-        for omega in np.geomspace(a / 40, top, 161)
+        for omega in np.geomspace(a / 40, top, FREQUENCIES)
         for name, method in METHODS.items()
     ]
     table = pd.DataFrame(rows)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
-MOST = 1e100  # a loop with a larger signal diverges
+MOST = 1e100  # times the limits, or without limits of a state: beyond it a loop diverges
+ENORMOUS = 1e250  # a state with which no run goes on, whatever the limits
 NEGLIGIBLE = 1e-17  # of the last term of a series, relative to the largest state
 
 
@@ -32,12 +33,12 @@ def _row(A: Array, i: int, x: Array) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _step(A: Array, b: Array, x: Array, following: Array, given: float) -> bool:
-    """Replace x by A x + b given; whether all of it stays finite. ``following`` is room for it."""
+def _step(A: Array, b: Array, x: Array, following: Array, given: float, most: float) -> bool:
+    """Replace x by A x + b given; whether all of it stays below ``most``. ``following`` is room for it."""
     small = True
     for i in range(len(x)):
         following[i] = _row(A, i, x) + b[i] * given
-        small = small and abs(following[i]) < MOST
+        small = small and abs(following[i]) < most
     for i in range(len(x)):
         x[i] = following[i]
     return small
@@ -102,6 +103,8 @@ def run(
     at_once = now if whole == 0 else 0.0
     around, direct = at_once * d_T, at_once * d_w[1]
     through = d_K * direct / (1 - around)  # u_tilde -> y_d -> v
+    limit = max(abs(low) if np.isfinite(low) else 0.0, abs(high) if np.isfinite(high) else 0.0)
+    most_u, most_x = (MOST * limit, ENORMOUS) if limit > 0 else (MOST, MOST)
     place = min(max(0.0, low), high)
     if quantum > 0:
         place = quantum * min(max(np.rint(place / quantum), lowest), highest)
@@ -133,11 +136,11 @@ def run(
         _move(A, b, norm, x, term, following, place, command[k], slew, read, T)
         way = command[k] - place
         place = command[k] if abs(way) <= slew * T else place + np.sign(way) * slew * T
-        small = _step(A_K, b_K, x_K, following, e)
-        small = _step(A_T, b_T, x_T, following, v) and small
-        small = _step(A_w, b_w, x_w, following, u_tilde) and small
+        small = _step(A_K, b_K, x_K, following, e, most_x)
+        small = _step(A_T, b_T, x_T, following, v, most_x) and small
+        small = _step(A_w, b_w, x_w, following, u_tilde, most_x) and small
         for i in range(len(x)):
-            small = small and abs(x[i]) < MOST
-        if not (small and abs(u[k]) < MOST):
+            small = small and abs(x[i]) < most_x
+        if not (small and abs(u[k]) < most_u):
             return y, u, command, start, k
     return y, u, command, start, s

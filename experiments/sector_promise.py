@@ -28,6 +28,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from design.digits import told_apart
 from experiments.closed_loop import Run, simulate
 from experiments.guarantee import Guarantee, sector_text
 from experiments.saturated_loop import SaturatedLoop
@@ -94,10 +95,12 @@ class Verdict:
     @property
     def needs(self) -> str:
         """What the run needs beside what is guaranteed and covered."""
+        needed, guaranteed = told_apart(self.needed_sector, self.guarantee.sector, 3, sector_text)
+        reached, most = told_apart(self.largest_control, self.covered_control, 3, _plain)
+        covered = f"up to {most}" if math.isfinite(self.covered_control) else "any size"
         return (
-            f"the run needs the sector {sector_text(self.needed_sector)} at t = {self.needed_at_s:.3g} s, "
-            f"{sector_text(self.guarantee.sector)} is guaranteed (|u| reached {self.largest_control:.3g}; up to "
-            f"{self.covered_control:.3g} is covered)"
+            f"the run needs the sector {needed} at t = {self.needed_at_s:.3g} s, {guaranteed} is guaranteed (|u| "
+            f"reached {reached}; {covered} is covered)"
         )
 
     def __str__(self) -> str:
@@ -109,11 +112,16 @@ class Verdict:
         if self.covered:
             return f"Covered by its guarantee: {self.needs}"
         if self.largest_steady >= self.limit:
+            steady, limit = told_apart(self.largest_steady, self.limit, 4, _plain)
             return (
-                f"NOT covered by its guarantee: the reference takes a control of {self.largest_steady:.4g}, beyond the "
-                f"limit {self.limit:.4g}; |u| reached {self.largest_control:.3g}"
+                f"NOT covered by its guarantee: the reference takes a control of {steady}, beyond the limit {limit}; "
+                f"|u| reached {self.largest_control:.3g}"
             )
         return f"NOT covered by its guarantee, which it left at t = {self.left_at_s:.3g} s: {self.needs}"
+
+
+def _plain(value: float, digits: int) -> str:
+    return f"{value:.{digits}g}"
 
 
 def steady_control(reference: Reference | SampledReference, plant: PlantModel, time_s: np.ndarray) -> np.ndarray:
@@ -254,6 +262,6 @@ def finely(loop: SaturatedLoop, run: Run, reference: Reference | SampledReferenc
     rate = min(A_TIME_CONSTANT * float(np.abs(roots).max()), MOST_SAMPLES / end)
     counts = np.maximum(np.ceil((ends - starts) * rate).astype(int), A_EXCURSION)
     fastest = 0.0 if isinstance(reference, SampledReference) else max(reference.omegas) / (2 * math.pi)
-    periods = np.linspace(0.0, end, int(min(A_PERIOD * fastest * end, MOST_SAMPLES)) + 2)
+    periods = np.linspace(0.0, end, round(min(A_PERIOD * fastest * end, MOST_SAMPLES)) + 2)
     spans = [np.linspace(*span) for span in zip(starts, ends, counts, strict=True)]
     return np.unique(np.concatenate([periods, *spans]))

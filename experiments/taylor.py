@@ -25,7 +25,8 @@ Array = NDArray[Any]
 BEYOND = 0.5  # of a step: how far beyond its end, where no kink is, the polynomial of a cut step is read
 TRIALS = 30  # in which what brief dead times change settles,
 SETTLED = 4.0  # of what is negligible, when it moves by no more than that
-DIVERGENT = 1e100  # a loop whose state passes this diverges
+DIVERGENT = 1e100  # times the limits, or without limits of a state: beyond it a loop diverges
+ENORMOUS = 1e250  # a state with which no run goes on, whatever the limits
 
 COMPLETE, DIVERGED, ENDLESS, CROWDED, EVENTFUL, UNSETTLED = 0, 1, 2, 3, 4, 5
 
@@ -71,6 +72,8 @@ def integrate(
         largest that the signal was.
     """
     n, k = len(x0), len(delays)
+    limit = max(abs(low) if np.isfinite(low) else 0.0, abs(high) if np.isfinite(high) else 0.0)
+    most_u, most_x = (DIVERGENT * limit, ENORMOUS) if limit > 0 else (np.inf, DIVERGENT)
     increments, polynomials = tables.increments, tables.polynomials
     indptr, indices, data = unsaturated
     signals = len(indptr) - 1 - n
@@ -263,8 +266,10 @@ def integrate(
             scale[r] = max(scale[r], abs(x[r]))
             if abs(x[r]) < NOTHING * scale[r]:  # lest it decay to numbers that the processor is slow with
                 x[r] = 0.0
-            if not abs(x[r]) < DIVERGENT:
+            if not abs(x[r]) < most_x:
                 status = DIVERGED
+        if not abs(U[0]) < most_u:
+            status = DIVERGED
         standing = standing + 1 if reach == 0 else 0
         t, late = t_next, late_next
         if status == DIVERGED:

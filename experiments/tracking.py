@@ -124,10 +124,11 @@ def tracking_summary(
         run, limit, limit_is_given (0 or 1), required, last_saturation_s (empty: saturated to the end), settling_s
         (error within 1 % of the reference's amplitude, measured from the lasting offset of the error; empty:
         never), offset and ripple (middle and half distance of the extremes of the error over the last period),
-        peak_error_after_1s, relative_error_percent (largest error of the last period over the reference's
-        amplitude). A run that diverges has empty cells. Then, of :mod:`experiments.sector_promise`,
-        guaranteed_sector (0: nothing is guaranteed), needed_sector, largest_control (the largest |u|) and
-        covered_control (how large it may be wherever v_s is), empty for a run without anti-windup, by Pade's
+        peak_error_after_1s (from one second on, as chapter 4 reads its plot; empty: the run is shorter),
+        relative_error_percent (largest error of the last period over the reference's amplitude). A run that diverges
+        has empty cells. Then, of :mod:`experiments.sector_promise`, guaranteed_sector (0: nothing is guaranteed),
+        needed_sector, largest_control (the largest |u|) and covered_control (how large it may be wherever v_s is; empty
+        too where nothing is guaranteed, or any size is covered), empty for a run without anti-windup, by Pade's
         approximation or that diverges; and covered (0 or 1).
     """
     rows = []
@@ -144,7 +145,7 @@ def tracking_summary(
                 "settling_s": settling_time(run.time_s, error - offset, SETTLED * reference.amplitude),
                 "offset": offset,
                 "ripple": ripple,
-                "peak_error_after_1s": np.abs(error[run.time_s >= 1.0]).max(),
+                "peak_error_after_1s": np.abs(error[run.time_s >= 1.0]).max() if run.time_s[-1] >= 1.0 else np.nan,
                 "relative_error_percent": 100 * (abs(offset) + ripple) / reference.amplitude,
             }
             | _promised(verdicts.get(name))
@@ -156,6 +157,6 @@ def _promised(found: Verdict | None) -> dict[str, float]:
     names = ("guaranteed_sector", "needed_sector", "largest_control", "covered_control")
     if found is None:
         return dict.fromkeys(names, np.nan) | {"covered": 0}
-    covered_control = found.covered_control if found.guarantee.sector else np.nan
+    covered_control = found.covered_control if 0 < found.guarantee.sector < 1 else np.nan
     numbers = (found.guarantee.sector, found.needed_sector, found.largest_control, covered_control)
     return dict(zip(names, numbers, strict=True)) | {"covered": int(found.covered)}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from design.frequency import frequency_grid
-from experiments.additive_distance import Changes, Factors, at_the_ends, distance, moved, reach
+from experiments.additive_distance import FIRST, Changes, Factors, at_the_ends, distance, moved, reach
 from experiments.distance_certificate import stays_below
 from identification.files import InputError
 from identification.plant import AdditiveBound, Mode, PlantModel
@@ -98,8 +98,10 @@ class PlantsWithin:
         self._most = np.full(self._count, LARGEST)
         self._most[-1] = max(plant.delay_s, 1 / bound.corner)
         middle = float(np.mean(self._corners))
-        axes = zip(np.eye(self._count), self._most, strict=True)
-        alone = np.array([self._reach(middle, axis, most) for axis, most in axes])
+        steps = np.ones(self._count)
+        steps[-1] = self._most[-1] / FIRST  # seconds are no unit: the first dead time that is tried is the largest
+        axes = zip(np.diag(steps), self._most / steps, strict=True)
+        alone = steps * [self._reach(middle, axis, float(most)) for axis, most in axes]
         self._units = np.where(alone > SMALLEST * self._most, alone, 0.0)
         if not self._units.any():
             raise InputError(

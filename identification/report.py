@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from decimal import ROUND_FLOOR, Context
+from math import floor, log10
 from typing import Any
 
 from identification.fit import FitResult
@@ -18,7 +19,7 @@ from identification.structure import in_physical_units
 from identification.subspace import SubspaceCheck
 from identification.uncertainty import BoundReport
 
-WIDTH = 28
+WIDTHS = (28, 12, 26, 11, 11)  # of the columns, at least
 POOR = 0.15  # median distance of a test from its own fit
 
 
@@ -196,11 +197,23 @@ def cautions(plant: PlantModel, distance: float) -> list[str]:
     return said
 
 
+def digits_of(value: float, width: float) -> int:
+    """Significant digits of a positive value that show two of the half width of its interval; 3 to 10."""
+    if not 0 < width < value:
+        return 3
+    return min(max(2 + floor(log10(value)) - floor(log10(width / 2)), 3), 10)
+
+
 def table(result: FitResult) -> str:
     """Estimate, 95 % interval, and standard errors by noise and by scatter, a line for each parameter; remarks."""
-    head = f"{'parameter':<{WIDTH}}{'estimate':>12}{'95 % interval':>26}{'noise':>11}"
-    lines = [head + (f"{'scatter':>11}" if len(result.tests) > 1 else "")]
+    rows = [("parameter", "estimate", "95 % interval", "noise", "scatter")]
     for label, value, lower, upper, noise, scatter in parameter_rows(result):
-        line = f"{label:<{WIDTH}}{value:>12.5g}{f'{lower:.5g} ... {upper:.5g}':>26}{noise:>11.2g}"
-        lines.append(line + ("" if scatter is None else f"{scatter:>11.2g}"))
+        digits = max(5, digits_of(max(abs(value), abs(lower), abs(upper)), upper - lower))
+        interval = f"{lower:.{digits}g} ... {upper:.{digits}g}"
+        rows.append(
+            (label, f"{value:.{digits}g}", interval, f"{noise:.2g}", "" if scatter is None else f"{scatter:.2g}")
+        )
+    shown = 5 if len(result.tests) > 1 else 4
+    widths = [max(least, *(2 + len(row[k]) for row in rows)) for k, least in enumerate(WIDTHS[:shown])]
+    lines = [row[0].ljust(widths[0]) + "".join(map(str.rjust, row[1:shown], widths[1:])) for row in rows]
     return "\n".join([*lines, *remarks(result)])

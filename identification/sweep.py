@@ -208,7 +208,8 @@ def _pooled_ratio(truncated: LocalFit, rest: LocalFit, power: Real, windows: Ind
         for x in (truncated.left, rest.left, truncated.freedom, rest.freedom, power)
     )
     per_coefficient = (left_without - left_with) / np.maximum(free_without - free_with, 1)
-    ratio = per_coefficient * free_with / np.maximum(left_with, np.finfo(float).tiny)
+    exact = left_with <= 0
+    ratio = np.where(exact, np.inf, per_coefficient * free_with / np.where(exact, 1.0, left_with))
     return np.where(left_without > MATERIAL * total, ratio, 0.0)
 
 

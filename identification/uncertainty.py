@@ -246,7 +246,8 @@ def _touching(
     residual = np.concatenate([lines.residual, gaps.residual])
     test = np.concatenate([lines.test, gaps.test])
     bound = replace(bound, gain=bound.gain * float(np.max(residual / np.abs(bound(1j * omega)))) * (1 + MARGIN))
-    ratio = np.abs(bound(1j * omega)) / np.maximum(residual, np.finfo(float).tiny)
+    ratio, some = np.full(omega.size, np.inf), residual > 0
+    ratio[some] = np.abs(bound(1j * omega[some])) / residual[some]
     if not np.all(ratio >= 1):
         raise RuntimeError(f"the additive bound misses a residual by a factor {1 / ratio.min():.3g}")
     touches: list[Touch] = []

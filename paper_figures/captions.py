@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pandas as pd
 
-from design.digits import lower_end, upper_end
+from design.digits import lower_end, told_apart, upper_end
 from experiments.guarantee import sector_text
 from experiments.metrics import settling_time
 from identification.files import InputError
@@ -26,6 +26,34 @@ def at_least(value: float, digits: int = 3) -> str:
 def at_most(value: float, digits: int = 3) -> str:
     """Return an upper bound to so many significant digits, rounded towards more so that it stays one."""
     return number(float(upper_end(value, digits)), digits)
+
+
+def apart(low: float, high: float, unit: str = "", digits: int = 3) -> str:
+    """Return a range, its ends in more digits where so many say them alike; one number if they are equal."""
+    first, last = told_apart(low, high, digits, number)
+    return f"{first}{unit} to {last}{unit}" if low != high else f"{first}{unit}"
+
+
+def time_unit(time_s: float) -> tuple[float, str]:
+    """Return the unit in which a time is said, in seconds: the largest of s, ms, us and ns that it is not shorter than.
+
+    A shorter one, and zero, are said in seconds.
+    """
+    units = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"))
+    return next((unit for unit in units if time_s >= unit[0]), units[0])
+
+
+def duration(time_s: float, digits: int = 3) -> str:
+    """Return a time in its unit."""
+    unit, name = time_unit(time_s)
+    return f"{number(time_s / unit, digits)} {name}"
+
+
+def sampling_rate(rate_hz: float) -> str:
+    """Return a number a second in the largest of GHz, MHz, kHz and Hz of which it is a tenth or more, else in Hz."""
+    units = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (1.0, "Hz"))
+    unit, name = next((unit for unit in units if rate_hz >= 0.1 * unit[0]), units[-1])
+    return f"{number(rate_hz / unit)} {name}"
 
 
 def fraction(value: float) -> str:
@@ -78,17 +106,16 @@ def largest(signal: pd.Series) -> str:
 
 def between(signal: pd.Series) -> str:
     """Say between which values a signal lies."""
-    return f"between {number(float(signal.min()))} and {number(float(signal.max()))}"
+    least, most = told_apart(float(signal.min()), float(signal.max()), 3, number)
+    return f"between {least} and {most}"
 
 
 def required_input(summary: pd.DataFrame) -> str:
     """Say whether the limits leave room for the input that following the reference takes."""
     limit, required = (of_run(summary, "none", column) for column in ("limit", "required"))
     verdict = "exceeds" if required > limit else "is within"
-    return (
-        f"Following the reference takes an input that reaches {number(required, 4)}, "
-        f"which {verdict} the limits of +-{number(limit, 4)}"
-    )
+    taken, given = told_apart(required, limit, 4, number)
+    return f"Following the reference takes an input that reaches {taken}, which {verdict} the limits of +-{given}"
 
 
 def promised(summary: pd.DataFrame, run: str) -> str:
@@ -105,10 +132,13 @@ def promised(summary: pd.DataFrame, run: str) -> str:
         return "has no guarantee, since theta2 is not stable"
     if of_run(summary, run, "required") >= of_run(summary, run, "limit"):
         return "is NOT covered by its guarantee, since the reference takes more than the limits give"
+    sector, k = told_apart(needed, guaranteed, 3, sector_text)
+    reached, most = told_apart(largest_control, covered_control, 3, number)
+    covered = "any size" if math.isnan(covered_control) else f"up to {most}"
     verdict = "is covered" if of_run(summary, run, "covered") else "is NOT covered"
     return (
-        f"{verdict} by its guarantee: it needs the sector {sector_text(needed)}, {sector_text(guaranteed)} is "
-        f"guaranteed (|u| reaches {number(largest_control)}, up to {number(covered_control)} is covered)"
+        f"{verdict} by its guarantee: it needs the sector {sector}, {k} is guaranteed (|u| reaches {reached}, "
+        f"{covered} is covered)"
     )
 
 

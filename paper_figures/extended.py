@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import pandas as pd
 
-from paper_figures.captions import last_saturated, number, of_run
+from experiments.extended import PERIODS, desaturation
+from identification.thesis import printed
+from paper_figures.captions import duration, last_saturated, number, of_run
 
 MARGIN = 1.15
 """How much longer the enlarged part is than the time to the last saturation."""
@@ -18,9 +21,14 @@ def chosen_limit(tables: Mapping[str, pd.DataFrame]) -> str:
     limit, time_s = (of_run(summary, "none", column) for column in ("limit", "last_saturation_s"))
     if of_run(summary, "none", "limit_is_given"):
         return f"Under the given limits of +-{number(limit, 4)} the loop without anti-windup {last_saturated(time_s)}."
+    target = desaturation(float(tables["extended"]["time_s"].iloc[-1]) / PERIODS)
+    printed_s = float(printed()["extended"]["desaturation_s"])
+    when = "at around 4 seconds, as the text says"
+    if not math.isclose(target, printed_s, rel_tol=1e-6):
+        when = f"at around {duration(target)}, as late in the reference's period as the text says"
     return (
         f"Chapter 4 prints no limits; +-{number(limit, 4)} are those under which the program finds that the loop "
-        f"without anti-windup leaves saturation at around 4 seconds, as the text says: it {last_saturated(time_s)}."
+        f"without anti-windup leaves saturation {when}: it {last_saturated(time_s)}."
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import pandas as pd
@@ -22,7 +23,8 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     error, control = (table[column].abs() for column in ("error_none", "control_none"))
     if control.isna().any():
         end = table["time_s"][control.notna()].iloc[-1]
-        behaviour = f"diverges, past 1e100 at about {number(end)} s: the stabiliser is unstable by itself"
+        times = " times the limits" if math.isfinite(of_run(summary, "none", "limit")) else ""
+        behaviour = f"diverges, past 1e100{times} at about {number(end)} s: the stabiliser is unstable by itself"
     else:
         behaviour = (
             f"{'grows' if control[~early].max() > control[early].max() else 'does not grow'}: |u| reaches "

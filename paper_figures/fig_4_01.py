@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import pandas as pd
@@ -20,13 +21,14 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the caption with the numbers of the tables."""
     table, summary = tables["extended"], tables["extended_summary"]
     after, settling = (of_run(summary, "none", column) for column in ("peak_error_after_1s", "settling_s"))
+    reached = "" if math.isnan(after) else f"reaches {number(after)} after the first second and "
     return (
         "Output under input saturation without anti-windup, plant with dead time (thesis Fig. 4.1): (a) reference r "
         "and output y, (b) tracking error, (c) the exact output less that of the same loop with second-order Pade "
         "approximations, as section 4.2 has it, in place of every dead time: at most "
         f"{largest(panels.pade_difference(table, NONE))}. {chosen_limit(tables)} {required_input(summary)}. The text "
         f"reads an error of about 8.6 m from its plot; here |e| starts at {number(abs(table['error_none'].iloc[0]))}, "
-        f"reaches {number(after)} after the first second and {settled(settling)}."
+        f"{reached}{settled(settling)}."
     )
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures import panels
-from paper_figures.captions import number, only
+from paper_figures.captions import apart, duration, number, only
 from paper_figures.style import FULL_WIDTH, LINES, styled
 
 TABLES: tuple[str, ...] = ("interpolation", "interpolation_map", "interpolation_summary")
@@ -23,14 +23,14 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     said = []
     for method, (_, label) in KINDS.items():
         ranges = summary[summary["method"] == method][["lowest", "highest"]].dropna().to_numpy()
-        where = " and ".join(f"from {number(low)} to {number(high)} rad/s" for low, high in ranges) or "nowhere"
+        where = " and ".join(_range(low, high) for low, high in ranges) or "nowhere"
         said.append(f"{'Lagrange interpolation' if method == 'lagrange' else f'designing the {label}'} {where}")
     a, delay_s = only(summary.head(1), "a"), only(summary.head(1), "delay_s")
     return (
         "The three designs of Q (thesis section 4.1; the thesis says in words that Lagrange interpolation fails at "
         "high "
         f"frequency and that designing the poles works only there), for a = {number(a)} rad/s and T_d = "
-        f"{number(1e3 * delay_s)} ms. (a) ||S|| of the loop over the frequency of the reference, drawn where the "
+        f"{duration(delay_s)}. (a) ||S|| of the loop over the frequency of the reference, drawn where the "
         "design "
         "works: Q stable, no zero of C_0 in the closed right half plane, which (3.19) needs, and ||S|| <= 2 (our "
         f"criterion); thin elsewhere. In the range drawn they work: {'; '.join(said)}. Designing the zeros puts the "
@@ -38,6 +38,10 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
         "T_d "
         "only; the line is the a T_d of (a)."
     )
+
+
+def _range(low: float, high: float) -> str:
+    return f"{'at' if low == high else 'from'} {apart(low, high)} rad/s"
 
 
 @styled()

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from paper_figures import panels
-from paper_figures.captions import number, only, settled
+from paper_figures.captions import duration, number, only, sampling_rate, settled
 from paper_figures.panels import CORRECTED, NONE, THESIS
 from paper_figures.style import FULL_WIDTH, LINES, styled
 
@@ -38,6 +38,7 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
         " and ".join(_size(_of(summary, "corrected", method, rate, "steady_error")) for rate in rates[[0, -1]])
         for method in METHODS
     )
+    shown, slowest, fastest = (sampling_rate(hertz) for hertz in (only(summary, "shown_hz"), *rates[[0, -1]]))
     lasting = _size(_of(summary, "thesis", CONTINUOUS, math.nan, "steady_error"))
     ends = [
         settled(_of(summary, "corrected", method, rate, "settling_s"))
@@ -46,15 +47,15 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     return (
         "What a real drive makes of the loop with dead time (not in the thesis): the controller on a computer, and an "
         f"actuator with the limits +-{number(only(summary, 'limit'))}, {levels} steps of {number(quantum, 2)} between "
-        f"them, {number(1e3 * only(summary, 'full_range_s'))} ms to go from one to the other, and a sample late. (a) "
+        f"them, {duration(only(summary, 'full_range_s'))} to go from one to the other, and a sample late. (a) "
         "The greatest error from t0 on; broad, in continuous time; thin, with the drive at "
-        f"{_kilohertz(only(summary, 'shown_hz'))}, its controller by Tustin's rule. With the corrected anti-windup the "
+        f"{shown}, its controller by Tustin's rule. With the corrected anti-windup the "
         f"error {ends[0]} in continuous time and {ends[1]} with the drive (to 1 % of the reference's amplitude around "
         f"its offset). (b) The greatest error of the last period ({number(only(summary, 'period_s'))} s) over the "
         f"sampling rate, {samples[0]} to {samples[1]} samples in a period of the controller's fastest root, "
         f"{number(only(summary, 'root'))} rad/s; dotted, the rate of (a). A block whose input is held answers half a "
         "sample late, which takes the model of the reference out of place by the sample time, Tustin's rule by its "
-        f"square: with the corrected anti-windup the error at {_kilohertz(rates[0])} and {_kilohertz(rates[-1])} is "
+        f"square: with the corrected anti-windup the error at {slowest} and {fastest} is "
         f"{held} with held inputs, {tustin} with Tustin's rule, part of which is the actuator's steps. The offset "
         f"of the thesis's anti-windup, {lasting} in continuous time, stays.{_divergent(summary)}"
     )
@@ -72,16 +73,12 @@ def _size(error: float) -> str:
     return "unbounded" if math.isnan(error) else number(error)
 
 
-def _kilohertz(rate_hz: float) -> str:
-    return f"{number(rate_hz / 1e3)} kHz"
-
-
 def _divergent(summary: pd.DataFrame) -> str:
     """Which of the runs with a drive are not there because they diverge."""
     gone = summary[summary["steady_error"].isna() & summary["rate_hz"].notna()]
     labels = {run.name: run.label for run in RUNS}
     said = [
-        f"{labels[str(row.run)]}, {METHODS[str(row.method)][0]}, {_kilohertz(float(str(row.rate_hz)))}"
+        f"{labels[str(row.run)]}, {METHODS[str(row.method)][0]}, {sampling_rate(float(str(row.rate_hz)))}"
         for row in gone.itertuples()
     ]
     return f" Not drawn, since it diverges: {'; '.join(said)}." if said else ""

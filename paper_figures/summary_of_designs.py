@@ -10,7 +10,7 @@ import pandas as pd
 
 from design.contract import Design
 from design.digits import lower_end, upper_end
-from paper_figures.captions import number, of_run, only, promises, required_input
+from paper_figures.captions import apart, number, of_run, only, promises, required_input, time_unit
 from paper_figures.summary_of_fit import Table
 
 DESIGNS = {"delay_free": "Chapter 2", "extended": "Chapters 3, 4", "robust": "Robust redesign"}
@@ -118,8 +118,13 @@ def _redesign(design: Design, robustness: pd.DataFrame | None) -> str:
     if robustness is None:
         return f"{said}."
     before, after = (number(of_run(robustness, f"design_{name}", "peak")) for name in ("extended", "robust"))
-    least, most = (1e3 * of_run(robustness, "design_robust", f"delay_{end}_s") for end in ("least", "greatest"))
-    ends = f"from {number(least)} ms" + ("" if isnan(most) else f" to {number(most)} ms")
+    least, most = (of_run(robustness, "design_robust", f"delay_{end}_s") for end in ("least", "greatest"))
+    unit, name = time_unit(least if isnan(most) else most)
+    ends = (
+        f"{number(least / unit)} {name} or more"
+        if isnan(most)
+        else f"from {apart(least / unit, most / unit, f' {name}')}"
+    )
     return (
         f"{said}: ||W_a C S|| = {after}, where that design has {before}; below 1 the loop is stable around every plant "
         "within W_a. "
@@ -152,4 +157,5 @@ def _outcome(table: pd.DataFrame, run: str) -> tuple[str, str, str]:
     )
     if isnan(error):
         return "diverges", "", ""
-    return "to the end" if isnan(last) else f"{number(last)} s", number(peak), f"{number(error)} %"
+    last_said, peak_said = "to the end" if isnan(last) else f"{number(last)} s", "" if isnan(peak) else number(peak)
+    return last_said, peak_said, f"{number(error)} %"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import floor, hypot, log10
+from math import hypot
 from typing import Any
 
 from design.digits import lower_end
@@ -13,7 +13,7 @@ from identification.files import InputError
 from identification.frequency_response import FrequencyResponse
 from identification.model import IdentifiedModel, plant_to_dict
 from identification.nominal import ONE_PLANT
-from identification.report import bound_text, cautions
+from identification.report import bound_text, cautions, digits_of
 from paper_figures.captions import number
 
 Paragraph = tuple[str, str]
@@ -51,7 +51,7 @@ def parameter_table(model: IdentifiedModel) -> Table:
         low, high = (fact(model.fit, "intervals_95", end, *path) for end in ("lower", "upper"))
         errors = [hypot(*(fact(model.fit, f"{kind}_standard_errors", *path) for kind in ("noise", "misfit")))]
         errors += [fact(model.fit, "scatter_standard_errors", *path)] if scattered else []
-        digits = _digits(max(abs(value), abs(low), abs(high)), high - low)
+        digits = digits_of(max(abs(value), abs(low), abs(high)), high - low)
         estimate, lower, upper = (_rounded(value, digits) for value in (value, low, high))
         return estimate, f"{lower} to {upper}", *(f"{error:.2g}" for error in errors)
 
@@ -98,13 +98,6 @@ def fact(facts: Mapping[str, Any], *path: str | int) -> Any:
             where = ".".join(map(str, path))
             raise InputError(f"the fit says nothing of {where}; expected a model that was fitted to sweeps") from None
     return found
-
-
-def _digits(value: float, width: float) -> int:
-    """Significant digits of a value that show two of the half width of its interval."""
-    if not 0 < width < value:
-        return 3
-    return min(max(2 + floor(log10(value)) - floor(log10(width / 2)), 3), 10)
 
 
 def _rounded(value: float, digits: int) -> str:

@@ -633,7 +633,7 @@ def test_a_run_that_diverges_is_drawn_as_far_as_it_goes_and_said_to_diverge():
     columns = [column for column in tables["delay_free"] if str(column).endswith("_none")]
     tables["delay_free"].loc[gone, columns] = np.nan
     module = figure_module("fig_2_14")
-    assert "the control diverges, past 1e100 at about 2 s" in module.caption(tables)
+    assert "the control diverges, past 1e100 times the limits at about 2 s" in module.caption(tables)
     (line,) = lettered(module.draw(tables))[1].lines
     assert 1.5 < line.get_xdata()[np.isfinite(line.get_ydata())].max() <= 2.0
 

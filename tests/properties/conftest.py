@@ -1,0 +1,23 @@
+"""A small plant with a dead time, its bound, and both designs of it: what the tests of other units scale."""
+
+from __future__ import annotations
+
+import pytest
+from other_units import small_delay_free, small_extended
+
+from design.contract import Design
+from identification.model import IdentifiedModel
+from identification.plant import AdditiveBound, Mode, PlantModel
+
+
+@pytest.fixture(scope="session")
+def small_model() -> IdentifiedModel:
+    """An integrator with one anti-resonance, one resonance and a dead time."""
+    plant = PlantModel(2.0, (Mode(3.0, 0.05),), (Mode(4.0, 0.05),), 0.2)
+    return IdentifiedModel(plant, AdditiveBound.printed_form(0.1, 1.0, 3.5, 0.2), None, {})
+
+
+@pytest.fixture(scope="session")
+def small_designs(small_model: IdentifiedModel) -> dict[str, Design]:
+    """Both designs, by their kind."""
+    return {"extended": small_extended(small_model, 1.0), "delay-free": small_delay_free(small_model, 1.0)}
