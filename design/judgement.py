@@ -11,7 +11,7 @@ import numpy as np
 from design.anti_windup import AntiWindup, second_order, uncertainty_cost
 from design.block import Block, bound_block, fastest_root, plant_block
 from design.corrected import SETTLED, corrected
-from design.popov import popov_sector, robust_loss
+from design.popov import popov_sector, robust_loss, robust_popov_sector
 from design.printed_optimum import thesis_choice
 from identification.files import InputError
 from identification.model import IdentifiedModel
@@ -106,7 +106,8 @@ def robust_sector(
     float
         0 when |W_a C S| reaches 1: then not even the loop without saturation is stable for all these plants.
     """
-    return popov_sector(kind.theta1_tilde, robust_loss(kind.one_plus, robustness), roots + kind.one_plus.zeros)[0]
+    loss = robust_loss(kind.one_plus, robustness)
+    return robust_popov_sector(kind.theta1_tilde, loss, roots + kind.one_plus.zeros)[0]
 
 
 def compensators(

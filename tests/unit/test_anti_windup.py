@@ -11,7 +11,7 @@ from design.anti_windup import AntiWindup, anti_windup, from_one_plus, second_or
 from design.block import Block, bound_block, plant_block
 from design.corrected import Corrected, corrected
 from design.judgement import compensators, judge, lasting_offset, robust_sector
-from design.popov import popov_sector
+from design.popov import popov_sector, robust_popov_sector
 from design.printed_optimum import least_f, optimal_gamma, thesis_choice
 from identification.files import InputError
 from identification.model import IdentifiedModel
@@ -359,8 +359,8 @@ def test_optimal_gamma_where_w_a_has_several_resonances() -> None:
 def test_no_multiplier_where_the_uncertainty_does_not_roll_off() -> None:
     """|1 + j m omega| times it then grows without end for every m > 0."""
     kind = second_order(0.05, 0.025, 5.0)
-    constant, _ = popov_sector(kind.theta1_tilde, lambda omega: np.full(len(omega), 0.2))
-    rolling, _ = popov_sector(kind.theta1_tilde, lambda omega: 0.2 / (1 + omega))
+    constant, _ = robust_popov_sector(kind.theta1_tilde, lambda omega: np.full(len(omega), 0.2))
+    rolling, _ = robust_popov_sector(kind.theta1_tilde, lambda omega: 0.2 / (1 + omega))
     omega = np.geomspace(1e-3, 1e6, 20000)
     circle = -1 / np.min(kind.theta1_tilde(1j * omega).real - 0.2)
     assert constant == pytest.approx(circle, rel=1e-3)
