@@ -109,7 +109,7 @@ def refined_maxima(function: Callable[[Real], Real], grid: Real, values: Real) -
 
 
 def searched_norm(block: Block) -> tuple[float, float]:
-    """The largest magnitude that :func:`peak` finds of a rational function, and the ends; its dead time does not matter.
+    """The largest magnitude that :func:`peak` finds of a rational function, or that it has at 0 or infinity.
 
     Returns
     -------

@@ -64,6 +64,12 @@ def popov_sector(theta1_tilde: Block) -> tuple[float, float]:
         height = min(search.lowest_refined(multiplier), height * (1 + BELOW))
 
 
+def meets_circle_criterion(theta1_tilde: Block, sector: float) -> bool:
+    """Whether Re theta1~(j omega) + 1/k > 0 for all omega and a sector k, in exact arithmetic; see popov_sector."""
+    numerator, denominator = popov_polynomial(theta1_tilde, 0.0), squared_magnitude(theta1_tilde.poles)
+    return not_positive_at(combined(Fraction(sector), numerator, Fraction(1), denominator)) is None
+
+
 def robust_popov_sector(
     theta1_tilde: Block, perturbation: Callable[[Real], Real], roots: tuple[complex, ...] = ()
 ) -> tuple[float, float]:

@@ -168,7 +168,7 @@ def test_the_corrected_one_keeps_what_it_states(implied: IdentifiedModel, best: 
     assert popov_sector(kind.theta1_tilde)[0] >= 0.95
     assert all(-960.0 * (1 + 1e-12) <= pole.real <= -np.log(100) * (1 - 1e-12) for pole in kind.one_plus.poles)
     assert all(zero.real < 0 for zero in kind.one_plus.zeros if zero != 0)
-    assert judge(implied, kind).recovery_s == pytest.approx(1.0, rel=1e-12)
+    assert 0.9 < judge(implied, kind).recovery_s <= 1.0
     assert best.f_lower <= best.f <= 1.001 * best.f_lower
 
 
@@ -243,7 +243,8 @@ def test_an_unstable_plant_pole_is_a_zero_of_one_plus_theta1() -> None:
         ((0.0, 0.9, 100.0), "expected a positive time and 0 < sector < 1"),
         ((1.0, 1.0, 100.0), "expected a positive time and 0 < sector < 1"),
         ((1.0, float("nan"), 100.0), "expected a positive time and 0 < sector < 1"),
-        ((1.0, 0.9, 2.0), "bandwidth of the anti-windup is 2 rad/s; expected a finite one of more than 9.21034"),
+        ((1.0, 0.9, float("inf")), "bandwidth of the anti-windup is inf rad/s; expected 4.60517 or more"),
+        ((1.0, 0.9, 2.0), "bandwidth of the anti-windup is 2 rad/s; expected 4.60517 or more and a finite one"),
     ],
 )
 def test_a_corrected_one_out_of_range_is_refused(
