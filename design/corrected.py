@@ -5,22 +5,29 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog
+from numpy.typing import NDArray
 
 from design.anti_windup import AntiWindup, from_one_plus, uncertainty_cost
-from design.block import Block, bound_block, from_polynomial
-from design.frequency import frequency_grid
-from design.popov import popov_sector
+from design.block import Block, bound_block
+from design.corrected_program import CorrectedProgram, Vertex
+from design.frequency import searched_norm
+from design.popov import meets_circle_criterion
 from identification.files import InputError
 from identification.plant import AdditiveBound
 
+Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
 SETTLED = 0.01  # what is left of y_d after the recovery time
-TOLERANCE = 1e-6  # of f, relative
-MARGIN = 2e-4  # by which 1/sector is lowered at most, relative: what lies between the frequencies
-PER_DECADE = 200  # frequencies
-REAL_PART = 0.1  # least real part of n over the denominator of W_a on the axis, which keeps the zeros of n stable
-TRIED = 9  # values of b
-HALVINGS = 8  # of the distance to the best one's neighbours
+RATES = 48  # values of the rate in a decade
+SPREAD = 1536  # values of b in a decade
+DECADES = 5  # below the bandwidth in which poles are looked for
+COARSE = 16  # every so many of them, and of these every eighth first, with every fourth of the rates
+OPEN = 1.05  # by which f may be worse at a coarse b for the finer ones beside it to be tried
+NEAREST = 6  # solutions by which the points of a finer lattice are first tried
+LIKELY = 1.1  # of the least lower bound: what is solved next
+WORTH, RESOLVED = 1e-6, 1e-9  # by which f must be better for another theta1~, of f and of ||W_a||
+PROGRAMS, MOST = 100, 1e-2  # solved programs with which WORTH grows tenfold, and up to what
 
 
 @dataclass(frozen=True)
@@ -34,7 +41,8 @@ class Corrected:
     f
         ||W_a (1 + theta1~)||_inf.
     f_lower
-        No n over the same poles meets the linear program's conditions (a slightly larger sector) with a smaller f.
+        No n over these poles, nor over any of the coarse lattice, meets the linear programs' conditions with a smaller
+        f, by weak duality; the conditions as computed in double precision.
     """
 
     anti_windup: AntiWindup
@@ -47,11 +55,11 @@ def corrected(
 ) -> Corrected:
     """The theta1~ of least f in a class whose theta2 is stable, for a stated sector, recovery time and bandwidth.
 
-        1 + theta1~ = prod(s - p_i)/(s + rate)^q n(s)/(s + b)^N,  rate = ln(100)/recovery_s,  2 rate <= b <= bandwidth,
+        1 + theta1~ = prod(s - p_i)/(s + rate)^q n(s)/(s + b)^N,  ln(100)/recovery_s <= rate <= b <= bandwidth,
 
     p_i being the q plant poles outside the open left half plane, N the order of W_a, n monic of degree N with
-    Re n/d >= 0.1 on the axis, d being W_a's monic denominator; or prod(s - p_i)/(s + bandwidth)^q where that is
-    better.
+    Re n/d >= 0.1 on the axis, d being W_a's monic denominator; rate = bandwidth/10^(i/48), b = bandwidth/10^(j/1536)
+    for whole i, j, none below bandwidth/10^5; or prod(s - p_i)/(s + bandwidth)^q, the washout, where that is better.
 
     Parameters
     ----------
@@ -64,7 +72,7 @@ def corrected(
     sector
         k of Theorem 2.3.1, between 0 and 1: with limits +-L the dead zone lies in it as long as |u| <= L/(1 - k).
     bandwidth
-        In rad/s, more than twice the rate; no pole of theta1~ is faster.
+        In rad/s, no less than ln(100)/recovery_s; no pole of theta1~ is faster.
 
     Raises
     ------
@@ -77,128 +85,126 @@ def corrected(
     these zeros. Without a bandwidth there is no optimum: s/(s + b) meets every sector below 1, and its f vanishes
     as b grows.
 
-    For a given b f and Popov's condition are convex in the coefficients of n, and with the multiplier 0 (the
-    circle criterion, which suffices) they become a linear program over half planes: cuts are added where a
-    solution violates |W_a (1 + theta1~)| <= f or Re theta1~ + 1/k >= 0 most, until none does by more than TOLERANCE.
-    The third condition, Re n/d >= REAL_PART, keeps the zeros of n stable, near those of d: the control rings with
-    them as long as the actuator is saturated. What is returned is judged again: sector, and f within 1 % of f_lower.
-    Each program is a relaxation, so that its value is a proved lower bound. b is the best of a grid, halved around
-    the best one some times: a search by values alone would move the last digits from machine to machine.
+    For given poles f and Popov's condition are convex in the coefficients of n, and with the multiplier 0 (the
+    circle criterion, which suffices) they are a linear program over half planes, see
+    :class:`design.corrected_program.CorrectedProgram`. The third condition, Re n/d >= 0.1, keeps the zeros of n stable,
+    near those of d: the control rings with them as long as the actuator is saturated.
+
+    The poles lie on a lattice that hangs on the bandwidth alone, so that a longer recovery only adds to it. f does not
+    increase with the recovery time by more than that by which it must be better for another theta1~ to be taken: 1e-6
+    of it and 1e-9 of ||W_a||, where many programs have to be solved more (tenfold for each hundred, 1e-2 at most).
+    Every point of a coarse lattice, j a multiple of 16, is solved or excluded by the dual of a program that was solved
+    nearby. Between them a point counts if its f is not below 1/OPEN of the lower one of its two coarse neighbours'
+    programs; so one whose neighbours are both excluded with that margin cannot win. What is returned is judged again:
+    the sector and f as computed from the roots.
     """
-    if not (np.isfinite([recovery_s, sector, bandwidth]).all() and recovery_s > 0 and 0 < sector < 1):
+    if not (np.isfinite([recovery_s, sector]).all() and recovery_s > 0 and 0 < sector < 1):
         raise InputError(
             f"the recovery time is {recovery_s:g} s and the sector {sector:g}; "
             "expected a positive time and 0 < sector < 1"
         )
-    rate = float(np.log(1 / SETTLED)) / recovery_s
-    if not 2 * rate < bandwidth < np.inf:
+    slowest = float(np.log(1 / SETTLED)) / recovery_s
+    if not slowest * (1 - 1e-9) <= bandwidth < np.inf:
         raise InputError(
-            f"the bandwidth of the anti-windup is {bandwidth:g} rad/s; expected a finite one of more than "
-            f"{2 * rate:g}, twice the rate that the recovery in {recovery_s:g} s takes"
+            f"the bandwidth of the anti-windup is {bandwidth:g} rad/s; expected {slowest:g} or more and a finite one, "
+            f"since the recovery in {recovery_s:g} s takes this rate"
         )
-
-    tried: dict[float, tuple[_Program, float, np.ndarray]] = {}
-    trials = np.linspace(np.log(2 * rate), np.log(bandwidth), TRIED)
-    for _ in range(1 + HALVINGS):
-        for logarithm in trials:
-            program = _Program(unstable, bound, rate, float(np.exp(logarithm)), sector)
-            tried[float(logarithm)] = (program, *program.solve())
-        at = sorted(tried)
-        k = min(range(len(at)), key=lambda k: tried[at[k]][1])
-        trials = np.array([(at[k] + at[other]) / 2 for other in (k - 1, k + 1) if 0 <= other < len(at)])
-    program, f_lower, coefficients = tried[at[k]]
-
-    found: list[tuple[float, float, AntiWindup]] = []
-    if np.isfinite(f_lower):
-        kind = program.compensator(coefficients)
-        found.append((uncertainty_cost(bound, kind.one_plus)[0], f_lower, kind))
-    fastest = from_one_plus(Block(1.0, unstable, (complex(-bandwidth),) * len(unstable)))
-    f = uncertainty_cost(bound, fastest.one_plus)[0]
-    found.append((f, f, fastest))
-    for f, f_lower, kind in sorted(found, key=lambda each: each[0]):
-        if popov_sector(kind.theta1_tilde)[0] >= sector and f <= 1.01 * f_lower:
-            return Corrected(kind, f, f_lower)
-    raise InputError(
-        f"no theta1~ of our class with poles from {rate:g} to {bandwidth:g} rad/s meets the sector {sector:g}; "
-        "expected a smaller sector or a slower recovery"
-    )
+    decades = min(float(np.log10(bandwidth / slowest)) + 1e-9, DECADES)
+    slowest = bandwidth / 10**decades
+    search = _Search(unstable, bound, sector, bandwidth, slowest)
+    i, j = (each.ravel() for each in np.indices((int(RATES * decades) + 1, int(SPREAD / COARSE * decades) + 1)))
+    j = j * COARSE
+    first = (i % 4 == 0) & (j % (8 * COARSE) == 0)
+    lower, proved = np.zeros((2, len(i)))
+    for points in (first, ~first):
+        lower[points], proved[points] = search.run(i[points], j[points])
+    near = np.flatnonzero(lower < OPEN * search.wanted)
+    beside = np.concatenate([np.arange(1 - COARSE, 0), np.arange(1, COARSE)])
+    fine = np.unique([np.repeat(i[near], len(beside)), (j[near, None] + beside).ravel()], axis=1)
+    search.run(*fine[:, fine[1] >= 0])
+    if search.best is None:
+        raise InputError(
+            f"no theta1~ of our class with poles from {slowest:g} to {bandwidth:g} rad/s meets the sector {sector:g}; "
+            "expected a smaller sector or a slower recovery"
+        )
+    f, _ = uncertainty_cost(bound, search.best.one_plus)
+    return Corrected(search.best, f, max(search.floor, min(f, float(proved.min()), search.best_lower)))
 
 
-class _Program:
-    """The linear program over the coefficients x of n(s) = s^N + sum x_j b^(N - j) s^j, for one b."""
+class _Search:
+    """The best theta1~ of the points of a lattice that were tried."""
 
-    def __init__(self, unstable: tuple[complex, ...], bound: AdditiveBound, rate: float, b: float, sector: float):
-        W_a = bound_block(bound)
-        self.fixed = Block(1.0, unstable, (complex(-rate),) * len(unstable))
-        self.b, self.order, self.sector = b, bound.order, sector
-        roots = (*W_a.zeros, *W_a.poles, *self.fixed.zeros, complex(-rate), complex(-b))
-        self.omega = frequency_grid(roots, PER_DECADE)
-        s = 1j * self.omega
-        powers = (s[:, None] / b) ** np.arange(self.order + 1)
-        basis = self.fixed(s)[:, None] * powers / (1 + s[:, None] / b) ** self.order
-        self.basis, self.monic = basis[:, :-1], basis[:, -1]
-        magnitude = np.abs(W_a(s))
-        self.size = float(magnitude.max())
-        self.W_a = W_a(s) / self.size
-        self.margin = min(MARGIN, (1 - sector) / 2)
-        # n in units of W_a's monic denominator
-        scale = self.b**self.order / np.prod(s[:, None] - np.array(W_a.poles), axis=1)
-        self.shape, self.shape_monic = scale[:, None] * powers[:, :-1], scale * powers[:, -1]
+    def __init__(
+        self, unstable: tuple[complex, ...], bound: AdditiveBound, sector: float, bandwidth: float, slowest: float
+    ) -> None:
+        self.W_a, self.sector, self.bandwidth = bound_block(bound), sector, bandwidth
+        self.program = CorrectedProgram(unstable, bound, sector, bandwidth, slowest)
+        self.known: list[tuple[float, float, Vertex]] = []
+        self.least: dict[tuple[int, int], float] = {}
+        washout = from_one_plus(Block(1.0, unstable, (complex(-bandwidth),) * len(unstable)))
+        self.best: AntiWindup | None = None
+        self.f = self.best_lower = np.inf
+        if meets_circle_criterion(washout.theta1_tilde, sector):
+            self.best, self.f = washout, searched_norm(self.W_a * washout.one_plus)[0]
+        # no f is below |W_a| at infinity, where 1 + theta1~ is 1
+        self.floor = 0.0 if self.W_a.relative_degree else self.W_a.gain
 
-    def solve(self) -> tuple[float, np.ndarray]:
-        """The least f, to TOLERANCE from below, and the coefficients; infinite and empty when none was found."""
-        rows, limits = [], []
+    @property
+    def wanted(self) -> float:
+        """The f that would be worth another compensator, in the unit of W_a."""
+        worth = min(WORTH * 10 ** (len(self.known) / PROGRAMS), MOST)
+        return self.f * (1 - worth) - RESOLVED * self.program.size if self.f > self.floor * (1 + WORTH) else 0.0
 
-        def bound_magnitude(at: np.ndarray, direction: np.ndarray) -> None:
-            weighted = direction * self.W_a[at]
-            rows.append(np.column_stack([(weighted[:, None] * self.basis[at]).real, -np.ones(len(at))]))
-            limits.append(-(weighted * self.monic[at]).real)
+    def run(self, i: Whole, j: Whole) -> Real:
+        """Solve or exclude points of the lattice; the lower bounds of their f, shape (2, P), as of the program."""
+        rate, b = self._poles(i, j)
+        lower = np.where(j * RATES <= i * SPREAD, self.program.first_bounds(rate, b), np.inf) * np.ones((2, 1))
+        waiting = np.flatnonzero(lower[0] < self.wanted)  # of rate <= b
 
-        def bound_sector(at: np.ndarray) -> None:
-            rows.append(np.column_stack([-self.basis[at].real, np.zeros(len(at))]))
-            limits.append(self.monic[at].real - 1 + (1 - self.margin) / self.sector)
+        def raise_bounds(points: Whole, vertex: Vertex) -> None:
+            found = self.program.lower_bounds(vertex, rate[points], b[points])
+            lower[:, points] = np.maximum(lower[:, points], found)
 
-        def bound_phase(at: np.ndarray) -> None:
-            rows.append(np.column_stack([-self.shape[at].real, np.zeros(len(at))]))
-            limits.append(self.shape_monic[at].real - REAL_PART)
+        if self.known:
+            rates, spreads = np.array([known[:2] for known in self.known]).T
+            away = np.hypot(np.log(rate[waiting, None] / rates), np.log(b[waiting, None] / spreads))
+            for ranked in np.argsort(away, axis=1)[:, :NEAREST].T:
+                for k in np.unique(ranked[lower[0, waiting] < self.wanted]):
+                    raise_bounds(waiting[(ranked == k) & (lower[0, waiting] < self.wanted)], self.known[k][2])
+        while True:
+            waiting = waiting[lower[0, waiting] < self.wanted]
+            if not len(waiting):
+                return lower
+            likely = lower[0, waiting] <= LIKELY * lower[0, waiting].min()
+            k = int(waiting[likely][-1])  # the slowest, since f mostly falls with the rate
+            vertex = self.program.solve(float(rate[k]), float(b[k]), self.wanted)
+            self.known.append((float(rate[k]), float(b[k]), vertex))
+            raise_bounds(waiting, vertex)
+            waiting = waiting[waiting != k]
+            if vertex.x is not None:
+                self._consider(int(i[k]), int(j[k]), vertex.x, float(lower[1, k]))
 
-        start = np.arange(0, len(self.omega), 40)
-        for direction in (1, 1j, -1, -1j):
-            bound_magnitude(start, np.full(len(start), direction))
-        bound_sector(start)
-        bound_phase(start)
-        for _ in range(60):
-            found = linprog(
-                np.append(np.zeros(self.order), 1.0),
-                np.vstack(rows),
-                np.concatenate(limits),
-                bounds=[(None, None)] * self.order + [(0, None)],
-                method="highs",
-                options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-            )
-            if found.x is None:  # infeasible, or beyond the solver
-                return np.inf, np.empty(0)
-            x, f = found.x[:-1], float(found.x[-1])
-            one_plus = self.monic + self.basis @ x
-            magnitude, real = np.abs(self.W_a * one_plus), one_plus.real - 1 + 1 / self.sector
-            phase = (self.shape_monic + self.shape @ x).real
-            above, below = magnitude > f * (1 + TOLERANCE), real < self.margin / 2 / self.sector
-            turned = phase < (1 - TOLERANCE) * REAL_PART
-            if not (above.any() or below.any() or turned.any()):
-                return self.size * f, x
-            peaks = np.flatnonzero(above & _local_maximum(magnitude))
-            bound_magnitude(peaks, np.exp(-1j * np.angle((self.W_a * one_plus)[peaks])))
-            bound_sector(np.flatnonzero(below & _local_maximum(-real)))
-            bound_phase(np.flatnonzero(turned & _local_maximum(-phase)))
-        return np.inf, np.empty(0)
+    def _poles(self, i: Whole | int, j: Whole | int) -> tuple[Real, Real]:
+        """Rate and b in rad/s."""
+        return np.asarray(self.bandwidth * 10.0 ** (-i / RATES)), np.asarray(self.bandwidth * 10.0 ** (-j / SPREAD))
 
-    def compensator(self, x: np.ndarray) -> AntiWindup:
-        """theta1~ and 1 + theta1~ with these coefficients."""
-        n = from_polynomial(np.append(1.0, x[::-1]), self.b)
-        poles = self.fixed.poles + (complex(-self.b),) * self.order
-        return from_one_plus(Block(1.0, self.fixed.zeros + n.zeros, poles))
+    def _consider(self, i: int, j: int, x: Real, lower: float) -> None:
+        """Keep a compensator that is better than the best so far, meets the sector and counts."""
+        rate, b = (float(each) for each in self._poles(i, j))
+        kind = self.program.compensator(rate, b, x)
+        f, _ = searched_norm(self.W_a * kind.one_plus)
+        if not (f < self.wanted and meets_circle_criterion(kind.theta1_tilde, self.sector)):
+            return
+        below = j - j % COARSE
+        beside = [at for at in {below, below + COARSE * (j > below)} if at * RATES <= i * SPREAD]
+        if j == below or f >= min(self._least_f(i, at) for at in beside) / OPEN:
+            self.best, self.f, self.best_lower = kind, f, lower
 
-
-def _local_maximum(values: np.ndarray) -> np.ndarray:
-    padded = np.concatenate([[-np.inf], values, [-np.inf]])
-    return np.asarray((values >= padded[:-2]) & (values >= padded[2:]))
+    def _least_f(self, i: int, j: int) -> float:
+        """The least f of a program, whatever the best so far; infinite if it has no solution."""
+        if (i, j) not in self.least:
+            rate, b = (float(each) for each in self._poles(i, j))
+            vertex = self.program.solve(rate, b, np.inf)
+            bound = self.program.lower_bounds(vertex, *(np.array([each]) for each in (rate, b)))[0, 0]
+            self.least[i, j] = float(bound) if vertex.x is not None else np.inf
+        return self.least[i, j]

@@ -83,7 +83,7 @@ def design_delay_free(
         Of the factor s^2 + epsilon of Lambda, in rad^2/s^2.
     recovery_s, sector, bandwidth
         Of the corrected anti-windup, see :func:`design.judgement.compensators`; unless given, the recovery takes half
-        as long as the loop's own transients.
+        as long as the loop's own transients at most.
 
     Raises
     ------
@@ -101,9 +101,7 @@ def design_delay_free(
     units, problem = stabiliser_problem(model, period_s, epsilon)
     W1, W2, decay_rate = problem.W1, problem.W2, problem.decay_rate
     synthesis = mixed_sensitivity(problem.G, W1, W2, decay_rate)
-    if recovery_s is None:
-        recovery_s = math.log(1 / SETTLED) / (2 * decay_rate)
-    anti_windup = compensators(model, recovery_s, sector, bandwidth)
+    anti_windup = compensators(model, math.log(1 / SETTLED) / (2 * decay_rate), recovery_s, sector, bandwidth)
     thesis = printed_form(anti_windup["thesis"])
     return Design(
         kind="delay-free",

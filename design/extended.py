@@ -56,8 +56,8 @@ def design_extended(
         Unless None, T_so rolls off as late as ||W_a C S|| <= robust_level < 1 allows, see
         :func:`design.redesign.robust_free_part`.
     recovery_s, sector, bandwidth
-        Of the corrected anti-windup, see :func:`design.judgement.compensators`; unless given, the recovery takes as
-        long as exp(-a t) takes to 1 %.
+        Of the corrected anti-windup, see :func:`design.judgement.compensators`; unless given, the recovery takes no
+        longer than exp(-a t) takes to 1 %.
 
     Raises
     ------
@@ -95,9 +95,7 @@ def design_extended(
     F1 = plant_block(model.plant)
     # W_aw/(K R_0) with W_aw = -s T_so, Eq. (3.16), (3.17), (3.21), (3.29); it is -C_s S_s, (3.23)
     F2 = (free.T_so * plant_denominator(model.plant) * plant_numerator(model.plant).inverse()).scaled(-1.0)
-    if recovery_s is None:
-        recovery_s = float(np.log(1 / SETTLED)) / a
-    anti_windup = compensators(model, recovery_s, sector, bandwidth)
+    anti_windup = compensators(model, float(np.log(1 / SETTLED)) / a, recovery_s, sector, bandwidth)
     thesis = printed_form(anti_windup["thesis"])
     return Design(
         kind="extended",

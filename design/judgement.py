@@ -11,9 +11,8 @@ import numpy as np
 from design.anti_windup import AntiWindup, second_order, uncertainty_cost
 from design.block import Block, bound_block, fastest_root, plant_block
 from design.corrected import SETTLED, corrected
-from design.popov import popov_sector, robust_loss
+from design.popov import popov_sector, robust_loss, robust_popov_sector
 from design.printed_optimum import thesis_choice
-from identification.files import InputError
 from identification.model import IdentifiedModel
 from identification.plant import PlantModel
 
@@ -106,11 +105,16 @@ def robust_sector(
     float
         0 when |W_a C S| reaches 1: then not even the loop without saturation is stable for all these plants.
     """
-    return popov_sector(kind.theta1_tilde, robust_loss(kind.one_plus, robustness), roots + kind.one_plus.zeros)[0]
+    loss = robust_loss(kind.one_plus, robustness)
+    return robust_popov_sector(kind.theta1_tilde, loss, roots + kind.one_plus.zeros)[0]
 
 
 def compensators(
-    model: IdentifiedModel, recovery_s: float, sector: float = SECTOR, bandwidth: float | None = None
+    model: IdentifiedModel,
+    own_s: float,
+    recovery_s: float | None = None,
+    sector: float = SECTOR,
+    bandwidth: float | None = None,
 ) -> dict[str, dict[str, Any]]:
     """The ``anti_windup`` member of design.json: the thesis's and the corrected compensator, each with its judgement.
 
@@ -118,35 +122,33 @@ def compensators(
     ----------
     model
         Plant and W_a.
+    own_s
+        Time in seconds in which the design's own transients fall to 1 %.
     recovery_s, sector
-        Of the corrected compensator, see :func:`design.corrected.corrected`.
+        Of the corrected compensator, see :func:`design.corrected.corrected`; unless given, the recovery takes
+        ``own_s`` at most.
     bandwidth
         Of the corrected compensator in rad/s; unless given, that of the fastest root of the plant and of W_a, which is
-        as far as the model says anything, and at least ten times the recovery's rate.
+        as far as the model says anything, and at least ten times the rate ln(100)/own_s. It does not depend on
+        ``recovery_s``, so that f does not increase with it.
 
     Raises
     ------
     InputError
         A number is out of its range, or no corrected compensator meets the sector.
     """
-    if not (np.isfinite(recovery_s) and recovery_s > 0):
-        raise InputError(f"the recovery time is {recovery_s:g} s; expected a positive time")
     bound = model.additive_bound
     alpha, beta, gamma = thesis_choice(bound)
     if bandwidth is None:
-        bandwidth = default_bandwidth(model, recovery_s)
+        fastest = fastest_root(plant_block(model.plant), bound_block(bound))
+        bandwidth = max(fastest, 10 * float(np.log(1 / SETTLED)) / own_s)
+    recovery_s = own_s if recovery_s is None else recovery_s
     found = corrected(plant_block(model.plant).unstable_poles, bound, recovery_s, sector, bandwidth)
     return {
         "thesis": {"alpha": alpha, "beta": beta, "gamma": gamma} | facts(model, second_order(alpha, beta, gamma)),
         "corrected": {"sector": sector, "bandwidth": bandwidth, "f_lower": found.f_lower}
         | facts(model, found.anti_windup),
     }
-
-
-def default_bandwidth(model: IdentifiedModel, recovery_s: float) -> float:
-    """The fastest root of plant and W_a in rad/s, or ten times the rate of the recovery where that is more."""
-    fastest = fastest_root(plant_block(model.plant), bound_block(model.additive_bound))
-    return max(fastest, 10 * float(np.log(1 / SETTLED)) / recovery_s)
 
 
 def facts(model: IdentifiedModel, kind: AntiWindup) -> dict[str, Any]:

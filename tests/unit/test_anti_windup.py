@@ -11,7 +11,7 @@ from design.anti_windup import AntiWindup, anti_windup, from_one_plus, second_or
 from design.block import Block, bound_block, plant_block
 from design.corrected import Corrected, corrected
 from design.judgement import compensators, judge, lasting_offset, robust_sector
-from design.popov import popov_sector
+from design.popov import popov_sector, robust_popov_sector
 from design.printed_optimum import least_f, optimal_gamma, thesis_choice
 from identification.files import InputError
 from identification.model import IdentifiedModel
@@ -168,7 +168,7 @@ def test_the_corrected_one_keeps_what_it_states(implied: IdentifiedModel, best: 
     assert popov_sector(kind.theta1_tilde)[0] >= 0.95
     assert all(-960.0 * (1 + 1e-12) <= pole.real <= -np.log(100) * (1 - 1e-12) for pole in kind.one_plus.poles)
     assert all(zero.real < 0 for zero in kind.one_plus.zeros if zero != 0)
-    assert judge(implied, kind).recovery_s == pytest.approx(1.0, rel=1e-12)
+    assert 0.9 < judge(implied, kind).recovery_s <= 1.0
     assert best.f_lower <= best.f <= 1.001 * best.f_lower
 
 
@@ -243,7 +243,8 @@ def test_an_unstable_plant_pole_is_a_zero_of_one_plus_theta1() -> None:
         ((0.0, 0.9, 100.0), "expected a positive time and 0 < sector < 1"),
         ((1.0, 1.0, 100.0), "expected a positive time and 0 < sector < 1"),
         ((1.0, float("nan"), 100.0), "expected a positive time and 0 < sector < 1"),
-        ((1.0, 0.9, 2.0), "bandwidth of the anti-windup is 2 rad/s; expected a finite one of more than 9.21034"),
+        ((1.0, 0.9, float("inf")), "bandwidth of the anti-windup is inf rad/s; expected 4.60517 or more"),
+        ((1.0, 0.9, 2.0), "bandwidth of the anti-windup is 2 rad/s; expected 4.60517 or more and a finite one"),
     ],
 )
 def test_a_corrected_one_out_of_range_is_refused(
@@ -359,8 +360,8 @@ def test_optimal_gamma_where_w_a_has_several_resonances() -> None:
 def test_no_multiplier_where_the_uncertainty_does_not_roll_off() -> None:
     """|1 + j m omega| times it then grows without end for every m > 0."""
     kind = second_order(0.05, 0.025, 5.0)
-    constant, _ = popov_sector(kind.theta1_tilde, lambda omega: np.full(len(omega), 0.2))
-    rolling, _ = popov_sector(kind.theta1_tilde, lambda omega: 0.2 / (1 + omega))
+    constant, _ = robust_popov_sector(kind.theta1_tilde, lambda omega: np.full(len(omega), 0.2))
+    rolling, _ = robust_popov_sector(kind.theta1_tilde, lambda omega: 0.2 / (1 + omega))
     omega = np.geomspace(1e-3, 1e6, 20000)
     circle = -1 / np.min(kind.theta1_tilde(1j * omega).real - 0.2)
     assert constant == pytest.approx(circle, rel=1e-3)

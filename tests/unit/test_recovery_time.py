@@ -1,0 +1,99 @@
+"""The recovery time is a bound: a longer one, a smaller sector or another unit never makes the least f larger."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from design.block import bound_block
+from design.corrected import RESOLVED, SETTLED, WORTH, corrected
+from design.extended import design_extended
+from design.frequency import block_norm
+from identification.files import InputError
+from identification.model import IdentifiedModel
+from identification.plant import AdditiveBound, Mode, PlantModel
+
+shares = st.floats(0.0, 2.0)
+bounds = st.builds(
+    lambda modes, real, zeros: AdditiveBound(
+        0.03,
+        (),
+        tuple(Mode(10**omega, 10**zeta) for omega, zeta in modes),
+        tuple(10**rate for rate in zeros[: 2 * len(modes) + len(real)]),
+        tuple(10**rate for rate in real),
+    ),
+    st.lists(st.tuples(shares, st.floats(-2.5, 0.0)), max_size=1),
+    st.lists(shares, min_size=1, max_size=1),
+    st.lists(shares, max_size=3),
+)
+
+
+def least_f(
+    bound: AdditiveBound, recovery_s: float, integrators: int, sector: float, bandwidth: float
+) -> tuple[float, float]:
+    """f and its lower bound; both infinite where nothing meets the sector."""
+    try:
+        found = corrected((0j,) * integrators, bound, recovery_s, sector, bandwidth)
+    except InputError:
+        return np.inf, np.inf
+    slowest = min((-pole.real for pole in found.anti_windup.one_plus.poles), default=np.inf)
+    assert np.log(1 / SETTLED) / slowest <= recovery_s * (1 + 1e-9)
+    return found.f, found.f_lower
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    bounds,
+    st.lists(st.floats(0.0, 2.5), min_size=3, max_size=3),
+    st.integers(0, 2),
+    st.floats(0.5, 0.99),
+    st.floats(1.0, 2.5),
+)
+def test_f_does_not_increase_with_the_recovery_time(
+    bound: AdditiveBound, decades: list[float], integrators: int, sector: float, width: float
+) -> None:
+    bandwidth = 10**width
+    times = np.log(1 / SETTLED) / bandwidth * 10 ** np.sort(decades)
+    found = [least_f(bound, float(time), integrators, sector, bandwidth) for time in times]
+    size, _ = block_norm(bound_block(bound))
+    for (f, f_lower), (longer, _) in pairwise(found):
+        assert longer <= f * (1 + 1e-5) + RESOLVED * size
+        assert f_lower <= f * (1 + 1e-12)
+
+
+def test_f_of_a_plant_that_once_showed_the_opposite() -> None:
+    """f was 0.0082 for a recovery in 0.2 s and 0.0246 in 10 s: the bandwidth followed the recovery time."""
+    plant = PlantModel(19.416211763234617, (), (Mode(64.83351679861622, 0.006065211741852967),), 0.04289450322705625)
+    plant = PlantModel(plant.gain, (Mode(13.998610151745932, 0.0081),), plant.pole_modes, plant.delay_s)
+    bound = AdditiveBound(0.0930769359974999, (), (), (), (23.246528149884053,))
+    model = IdentifiedModel(plant, bound, None, {})
+    times = (0.08, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+    found = [
+        design_extended(model, [1.5], 4.0, [(2.0, 1.0)], recovery_s=time).anti_windup["corrected"] for time in times
+    ]
+    assert [facts["bandwidth"] for facts in found] == pytest.approx([64.83351679861622] * len(times))
+    assert all(np.diff([facts["f"] for facts in found]) <= 2 * WORTH * found[0]["f"])
+    assert all(facts["recovery_s"] <= time * (1 + 1e-9) for facts, time in zip(found, times, strict=True))
+
+
+@settings(max_examples=15, deadline=None)
+@given(bounds, st.floats(-9.0, 9.0), st.floats(-15.0, 15.0), st.integers(0, 2), st.floats(0.2, 2.0))
+def test_the_units_do_not_matter(
+    bound: AdditiveBound, time_unit: float, gain_unit: float, integrators: int, decades: float
+) -> None:
+    T, k = 10**time_unit, 10**gain_unit
+    scaled = AdditiveBound(
+        bound.gain * k,
+        (),
+        tuple(Mode(mode.omega / T, mode.zeta) for mode in bound.pole_modes),
+        tuple(rate / T for rate in bound.real_zeros),
+        tuple(rate / T for rate in bound.real_poles),
+    )
+    recovery_s = np.log(1 / SETTLED) / 100.0 * 10**decades
+    f, _ = least_f(bound, recovery_s, integrators, 0.9, 100.0)
+    other, _ = least_f(scaled, recovery_s * T, integrators, 0.9, 100.0 / T)
+    assert other == pytest.approx(f * k, rel=1e-5, abs=RESOLVED * block_norm(bound_block(scaled))[0])
