@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
 
 import numpy as np
 
 from design.block import Block
-from design.frequency import Real, frequency_grid
+from design.frequency import Real, frequency_grid, refined_maxima
+from design.positivity import combined, not_positive_at, popov_polynomial, squared_magnitude
 
 FINE = 200  # frequencies a decade before the peaks are refined
-REFINEMENTS = 8  # of each peak
-A_REFINEMENT = 17  # frequencies of each, in place of three
+BELOW = 1e-9  # by which the sector lies below the largest one found, relative
 ROUNDING = 1e-12  # of -Re theta1~: a height that is nearer to 1 is the 1 of theta1~(0) = -1
 
 
 def circle_sector(
     theta1_tilde: Block, perturbation: Callable[[Real], Real] | None = None, roots: tuple[complex, ...] = ()
 ) -> float:
-    """The largest sector of the circle criterion: :func:`design.popov.popov_sector` with the multiplier 0.
+    """The largest sector found of the circle criterion: that of Popov's condition with the multiplier 0.
 
     Parameters
     ----------
-    theta1_tilde, perturbation, roots
-        As of :func:`design.popov.popov_sector`.
+    theta1_tilde
+        Strictly proper and stable.
+    perturbation, roots
+        As of :func:`design.popov.robust_popov_sector`.
 
     Returns
     -------
@@ -33,8 +36,9 @@ def circle_sector(
 
     Notes
     -----
-    The local maxima of 1/k on a grid that resolves all roots are refined; one between two points of the grid that
-    neither of them shows would be missed.
+    The local maxima of 1/k on a grid that resolves all roots are refined. Without a perturbation the sector is then
+    proved, see :func:`design.positivity.not_positive_at`, unless it is infinite or 1 to 1e-12, as theta1~(0) = -1 makes
+    it. With one, a maximum between two points of the grid that neither of them shows would be missed.
     """
 
     def least(omega: Real) -> Real:
@@ -45,15 +49,17 @@ def circle_sector(
     values = least(omega)
     if not np.all(np.isfinite(values)):
         return 0.0
-    tops = 1 + np.flatnonzero((values[1:-1] >= values[:-2]) & (values[1:-1] >= values[2:]))
-    left, right = omega[tops - 1], omega[tops + 1]
-    height = max(-float(theta1_tilde(0j).real), float(values.max()))
-    for _ in range(REFINEMENTS if len(tops) else 0):
-        finer = np.linspace(left, right, A_REFINEMENT)
-        values = least(finer.ravel()).reshape(finer.shape)
-        best = np.clip(np.argmax(values, axis=0), 1, A_REFINEMENT - 2)
-        left, right = (np.take_along_axis(finer, best[None] + side, axis=0)[0] for side in (-1, 1))
-        height = max(height, float(values.max()))
+    height = max(-float(theta1_tilde(0j).real), float(refined_maxima(least, omega, values)[1].max()))
     if abs(height - 1) <= ROUNDING:
         return 1.0
-    return float("inf") if height <= 0 else 1 / height
+    if height <= 0:
+        return float("inf")
+    numerator, denominator = popov_polynomial(theta1_tilde, 0.0), squared_magnitude(theta1_tilde.poles)
+    while True:
+        k = (1 - BELOW) / height
+        if perturbation is not None:
+            return k
+        missed = not_positive_at(combined(Fraction(k), numerator, Fraction(1), denominator))
+        if missed is None:
+            return k
+        height = max(height * (1 + BELOW), float(least(np.sqrt([missed]))[0]))

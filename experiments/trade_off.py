@@ -21,7 +21,7 @@ RECOVERIES = 9  # recovery times, from the fastest that the bandwidth leaves roo
 
 
 def trade_off_tables(design: Design, tick: Callable[[], object] = lambda: None) -> dict[str, pd.DataFrame]:
-    """The least f found of the corrected class over recovery times and sectors, and the design's own compensators.
+    """The least f found of the corrected class over recovery times and sectors, and the design's own in it.
 
     Parameters
     ----------
