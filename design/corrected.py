@@ -82,7 +82,7 @@ def corrected(
     Notes
     -----
     The class is ours; the thesis has (2.23) only. With a stable theta1~, theta2 = P (1 + theta1~) is stable if and only
-    if 1 + theta1~ has these zeros. For one integrator and a strictly proper W_a there is no optimum without a bandwidth:
+    if 1 + theta1~ has these zeros. For one integrator and a strictly proper W_a no bandwidth means no optimum:
     s/(s + b) meets every sector below 1, and its f vanishes as b grows.
 
     For given poles f and Popov's condition are convex in the coefficients of n, and with the multiplier 0 (the
