@@ -53,7 +53,7 @@ class Corrected:
 def corrected(
     unstable: tuple[complex, ...], bound: AdditiveBound, recovery_s: float, sector: float, bandwidth: float
 ) -> Corrected:
-    """The theta1~ of least f in a class whose theta2 is stable, for a stated sector, recovery time and bandwidth.
+    """The theta1~ of least f found in a class whose theta2 is stable, for a stated sector, recovery time and bandwidth.
 
         1 + theta1~ = prod(s - p_i)/(s + rate)^q n(s)/(s + b)^N,  ln(100)/recovery_s <= rate <= b <= bandwidth,
 
@@ -81,9 +81,9 @@ def corrected(
 
     Notes
     -----
-    The class is ours; the thesis has (2.23) only. theta2 = P (1 + theta1~) is stable if and only if 1 + theta1~ has
-    these zeros. Without a bandwidth there is no optimum: s/(s + b) meets every sector below 1, and its f vanishes
-    as b grows.
+    The class is ours; the thesis has (2.23) only. With a stable theta1~, theta2 = P (1 + theta1~) is stable if and only
+    if 1 + theta1~ has these zeros. For one integrator and a strictly proper W_a no bandwidth means no optimum:
+    s/(s + b) meets every sector below 1, and its f vanishes as b grows.
 
     For given poles f and Popov's condition are convex in the coefficients of n, and with the multiplier 0 (the
     circle criterion, which suffices) they are a linear program over half planes, see
@@ -124,8 +124,8 @@ def corrected(
     search.run(*fine[:, fine[1] >= 0])
     if search.best is None:
         raise InputError(
-            f"no theta1~ of our class with poles from {slowest:g} to {bandwidth:g} rad/s meets the sector {sector:g}; "
-            "expected a smaller sector or a slower recovery"
+            f"no theta1~ of our class with poles from {slowest:g} to {bandwidth:g} rad/s was found that meets the "
+            f"sector {sector:g}; expected a smaller sector or a slower recovery"
         )
     f, _ = uncertainty_cost(bound, search.best.one_plus)
     return Corrected(search.best, f, max(search.floor, min(f, float(proved.min()), search.best_lower)))

@@ -26,15 +26,15 @@ class Judgement:
     Parameters
     ----------
     f
-        ||W_a (1 + theta1~)||_inf, (2.19).
+        ||W_a (1 + theta1~)||_inf, (2.19), which exceeds it by 1e-9 of it at most: proved.
     f_omega
         Frequency in rad/s where it is reached.
     popov_sector
-        Largest sector k that Popov's condition allows; None when it allows every one.
+        Sector k that Popov's condition is proved to allow, 1e-9 below the largest found; None: every one.
     popov_multiplier_s
         Of the Popov line, in seconds: through -1/k with the slope 1/multiplier; 0 is the circle criterion.
     theta1_tilde_at_zero
-        theta1~(0); -1 is what removes the integrator from theta2.
+        theta1~(0); -1 is what removes a single integrator from theta2.
     theta2_stable
         Whether theta2 is stable, which the proof of Theorem 2.3.1 needs.
     lasting_offset
@@ -89,7 +89,7 @@ def lasting_offset(plant: PlantModel, kind: AntiWindup) -> float | None:
 def robust_sector(
     kind: AntiWindup, robustness: Callable[[np.ndarray], np.ndarray], roots: tuple[complex, ...]
 ) -> float:
-    """The largest sector for which Popov's condition holds for every plant within W_a, not for the model alone.
+    """The largest sector found for which Popov's condition holds for every plant within W_a, not for the model alone.
 
     Parameters
     ----------

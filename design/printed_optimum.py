@@ -61,7 +61,7 @@ def beta_grid(alpha: float) -> tuple[float, ...]:
 
 
 def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float, float]:
-    """The least f of (2.23) found over alpha, beta and gamma together, no pole of theta1~ beyond a bandwidth.
+    """The least f found of (2.23) over alpha, beta and gamma together, no pole of theta1~ beyond a bandwidth.
 
     Parameters
     ----------
@@ -82,8 +82,9 @@ def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float
 
     For given alpha and beta f is convex in gamma, see :func:`optimal_gamma`. Over the two time constants it is
     not, so that a grid from 1/bandwidth to a hundred times the period of W_a's resonance gives the starts. f is
-    minimised from the two best on fixed frequencies, and from what that gives with its peak located: a local search,
-    which proves nothing of the rest.
+    minimised from the two best on fixed frequencies, and from what that gives on all. That no other alpha and beta are
+    better is not proved; f belongs to the three numbers that are returned, as
+    :func:`design.anti_windup.uncertainty_cost` says.
     """
     W_a = bound_block(bound)
     omega = frequency_grid(W_a.zeros + W_a.poles, per_decade=30)
@@ -106,12 +107,16 @@ def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float
     def polish(cost: Callable[[np.ndarray], float], start: np.ndarray, size: float, most: int) -> np.ndarray:
         limits = [(float(np.log(ends[0])), float(np.log(ends[1])))] * 2
         simplex = np.clip(start + size * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), *limits[0])
+
+        def logarithm(logarithms: np.ndarray) -> float:  # the unit of W_a does not count
+            return float(np.log(cost(logarithms)))
+
         found = minimize(
-            cost,
+            logarithm,
             start,
             method="Nelder-Mead",
             bounds=limits,
-            options={"maxfev": most, "initial_simplex": simplex},
+            options={"maxfev": most, "initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-9},
         )
         return np.asarray(found.x)
 

@@ -97,3 +97,52 @@ def test_the_units_do_not_matter(
     f, _ = least_f(bound, recovery_s, integrators, 0.9, 100.0)
     other, _ = least_f(scaled, recovery_s * T, integrators, 0.9, 100.0 / T)
     assert other == pytest.approx(f * k, rel=1e-5, abs=RESOLVED * block_norm(bound_block(scaled))[0])
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    pairs=st.lists(st.tuples(st.floats(1.0, 4.0), st.floats(0.5, 9.0), st.floats(0.3, 1.5)), min_size=1, max_size=8),
+    modes=st.lists(st.tuples(st.floats(0.5, 2.5), st.floats(-2.5, -0.5)), min_size=2, max_size=2),
+    bound=st.tuples(st.floats(-4.0, -2.0), st.floats(0.5, 2.5), st.floats(0.5, 2.5), st.floats(-2.5, -0.5)),
+    robust=st.booleans(),
+    time_unit=st.floats(-9.0, 9.0),
+    gain_unit=st.floats(-15.0, 15.0),
+)
+def test_a_whole_extended_design_in_other_units(
+    pairs: list[tuple[float, float, float]],
+    modes: list[tuple[float, float]],
+    bound: tuple[float, float, float, float],
+    robust: bool,
+    time_unit: float,
+    gain_unit: float,
+) -> None:
+    """One to eight reference frequencies, a plant with a pair of zeros and of poles: everything that is printed."""
+    omegas, level = np.cumsum([pair[2] for pair in pairs]), 0.9 if robust else None
+    gain, corner, omega, zeta = 10 ** np.array(bound)
+
+    def designed(T: float, k: float) -> dict[str, float]:
+        zero, pole = (Mode(10 ** each[0] / T, 10 ** each[1]) for each in modes)
+        model = IdentifiedModel(
+            PlantModel(2.0 * k / T, (zero,), (pole,), 0.01 * T),
+            AdditiveBound.printed_form(gain * k, corner / T, omega / T, zeta),
+            None,
+            {},
+        )
+        factors = [(e / T, f / T**2) for e, f, _ in pairs]
+        design = design_extended(model, omegas / T, 2.0 / T, factors, robust_level=level)
+        found = {"roll_off": design.parameters.get("roll_off", 0.0) * T}
+        for name, facts in design.anti_windup.items():
+            found[name + " f"] = facts["f"] / k
+            found[name + " sector"] = facts["popov_sector"] or np.inf
+            found[name + " at zero"] = facts["theta1_tilde_at_zero"]
+            found[name + " recovery"] = facts["recovery_s"] / T
+        return found
+
+    try:
+        here = designed(1.0, 1.0)
+    except InputError:
+        with pytest.raises(InputError):
+            designed(10**time_unit, 10**gain_unit)
+        return
+    # gamma is the minimum of a flat function: to the root of the accuracy of f
+    assert designed(10**time_unit, 10**gain_unit) == pytest.approx(here, rel=1e-6)
