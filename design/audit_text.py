@@ -62,7 +62,7 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
     bandwidth = design.anti_windup["corrected"]["bandwidth"]
     lines += [
         "",
-        f"The best of (2.23) with no pole beyond {bandwidth:g} rad/s: alpha = {alpha:.4g} s, beta = {beta:.4g} s, "
+        f"The best found of (2.23) with no pole beyond {bandwidth:g} rad/s: alpha = {alpha:.4g} s, beta = {beta:.4g} s, "
         "gamma = "
         f"{gamma:.4g}, f = {f:.4g}.",
     ]
