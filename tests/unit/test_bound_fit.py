@@ -62,6 +62,12 @@ def test_multipliers_prove_what_holds_and_no_more(share: float) -> None:
     assert any(found) == (share > 0)
 
 
+def test_a_positive_sum_for_constants_alone_proves_nothing() -> None:
+    """|W_a|^2 = 8/(5 + 3 x) is 1 at x = 1 and 1/4 at 9; the multipliers 1 and 2 exclude a constant D only."""
+    omega, level = np.array([1.0, 3.0]), np.array([1.0, 0.5])
+    assert not excludes(omega, level, level * [2.0, 1.0], np.array([1.0, 0.0]), np.array([0.0, 2.0]), 1)
+
+
 def test_levels_that_an_order_keeps_without_touching_the_envelope() -> None:
     """A residual of half the envelope everywhere: a W_a of excess 1/2 exists, so 1 is no limit."""
     level = np.ones(BAND.size)
