@@ -23,7 +23,7 @@ from benchmarks.referee.factors import Factors, unit
 from benchmarks.referee.peaks import supremum
 from benchmarks.referee.winding import around
 
-DIGITS = 40
+DIGITS = 40  # to begin with; doubled until twice as many say the same
 mp = mpmath.mp
 Polynomial = list[mpmath.mpc]  # highest power first
 
@@ -40,11 +40,27 @@ def optimum(G: Factors, W1: Factors, W2: Factors, guess: float) -> float:
     guess
         Something of the size of the answer.
     """
+    digits = DIGITS
+    while True:
+        found, distance = _optimum(G, W1, W2, guess, digits)
+        again = _problem(G, W1, W2, 2 * digits)
+        with mpmath.workdps(2 * digits):
+            if abs(again.distance(found) - distance) < 1e-9 * max(1.0, distance):
+                return found
+        digits *= 2
+
+
+def _problem(G: Factors, W1: Factors, W2: Factors, digits: int) -> _Problem:
     q = unit(G, W1, W2)
-    with mpmath.workdps(DIGITS):
-        problem = _Problem(
-            tuple(mp.mpc(p) / q for p in G.poles if p.real > 1e-9 * abs(p)), _scaled(W1, q), _scaled(W2, q)
-        )
+    with mpmath.workdps(digits):
+        unstable = tuple(mp.mpc(p) / q for p in G.poles if p.real > 1e-9 * abs(p))
+        return _Problem(unstable, _scaled(W1, q), _scaled(W2, q))
+
+
+def _optimum(G: Factors, W1: Factors, W2: Factors, guess: float, digits: int) -> tuple[float, float]:
+    """The optimum with so many digits, and the distance there."""
+    problem, q = _problem(G, W1, W2, digits), unit(G, W1, W2)
+    with mpmath.workdps(digits):
         on_axis = [abs(complex(W2(np.array(p)))) for p in G.poles if abs(p.real) <= 1e-9 * abs(p)]
         omega = around((*W1.zeros, *W1.poles, *W2.zeros, *W2.poles), q)
 
@@ -55,7 +71,7 @@ def optimum(G: Factors, W1: Factors, W2: Factors, guess: float) -> float:
         floor = max(supremum(pointwise, omega)[0], *on_axis, 0.0)
         low = floor * (1 + 1e-8)
         if problem.distance(low) <= 1:
-            return floor
+            return low, problem.distance(low)
         high = max(guess, 1.001 * low)
         while problem.distance(high) > 1:
             low, high = high, 1.5 * high
@@ -67,12 +83,13 @@ def optimum(G: Factors, W1: Factors, W2: Factors, guess: float) -> float:
             middle = float(np.exp((a * value_high - b * value_low) / (value_high - value_low)))
             value = np.log(problem.distance(middle))
             if abs(value) < 1e-9:
-                return middle
+                return middle, problem.distance(middle)
             if value > 0:
                 low, value_low, value_high = middle, value, value_high / 2
             else:
                 high, value_high, value_low = middle, value, value_low / 2
-        return float(np.sqrt(low * high))
+        found = float(np.sqrt(low * high))
+        return found, problem.distance(found)
 
 
 def _scaled(of: Factors, q: float) -> tuple[mpmath.mpf, list[mpmath.mpc], list[mpmath.mpc]]:
@@ -114,9 +131,9 @@ def _at(roots: list[mpmath.mpc], s: mpmath.mpc) -> mpmath.mpc:
 
 def _factor(even: Polynomial) -> tuple[mpmath.mpf, list[mpmath.mpc]]:
     """Gain and the roots left of the axis of a spectral factor of a polynomial in x = s^2, positive on the axis."""
-    while abs(even[0]) <= mp.mpf(10) ** (-DIGITS / 2) * max(abs(c) for c in even):
+    while abs(even[0]) <= mp.mpf(10) ** (-mp.dps / 2) * max(abs(c) for c in even):
         even = even[1:]
-    squares = mp.polyroots([c.real for c in even], maxsteps=500, extraprec=4 * DIGITS) if len(even) > 1 else []
+    squares = mp.polyroots([c.real for c in even], maxsteps=500, extraprec=4 * mp.dps) if len(even) > 1 else []
     roots = [mp.sqrt(x) for x in squares]
     return mp.sqrt(abs(even[0])), [root if root.real < 0 else -root for root in roots]
 

@@ -101,11 +101,11 @@ def test_runge_kutta_knows_the_delayed_integrator() -> None:
 
 def test_a_run_that_is_off_is_seen() -> None:
     fine = np.sin(np.linspace(0, 3, 50))
-    assert loops.compared("y", fine, fine, fine).share <= 1
-    assert loops.compared("y", fine, fine, fine + 1e-7).share > 1
+    assert loops.compared("y", [fine] * 3, fine).share <= 1
+    assert loops.compared("y", [fine] * 3, fine + 1e-7).share > 1
     late = np.concatenate([np.zeros(2), fine[2:]])
-    assert loops.compared("y", fine, fine, late).disagreement == pytest.approx(1.0)
-    assert loops.compared("y", 1.1 * fine, fine, late).allowed == math.inf
+    assert loops.compared("y", [fine] * 3, late).disagreement == pytest.approx(1.0)
+    assert loops.compared("y", [1.5 * fine, 1.1 * fine, fine], late).allowed == math.inf
 
 
 def test_nehari_knows_what_can_be_said_by_hand() -> None:
