@@ -113,7 +113,9 @@ def _margin_lines(margins: Margins | str | None) -> Iterable[str]:
     if not isinstance(margins, Margins):
         return [f"  no margins                      {margins}"]
     guarantee = (
-        "every plant within W_a is stable" if margins.is_guaranteed else "NO guarantee for the plants within W_a"
+        "the loop around every plant within W_a is stable"
+        if margins.is_guaranteed
+        else "NO guarantee for the plants within W_a"
     )
     gains = _intervals(margins.gains, (f"{1 / LARGEST:g} or less", f"{LARGEST:g} or more"), lambda k: f"{k:.4g}")
     phase = "any" if margins.phase_deg.omega is None else _end(margins.phase_deg, "", lambda phi: f"{phi:.4g} deg")

@@ -45,7 +45,7 @@ class Redesign:
 def robust_free_part(
     model: IdentifiedModel, wanted: Conditions, pairs: Sequence[tuple[float, float]], level: float
 ) -> Redesign:
-    """The latest roll-off found of T_so for which ||W_a C S|| <= level, so that every plant within W_a is stable.
+    """The latest roll-off found of T_so with ||W_a C S|| <= level: the loop around every plant within W_a is stable.
 
     Parameters
     ----------

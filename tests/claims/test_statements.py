@@ -163,7 +163,7 @@ def test_the_shipped_sweeps_say_that_they_are_synthetic():
 
 
 def test_without_anti_windup_the_weights_decide():
-    """With ours u grows without bound though K is stable; with a W_1 that asks for less the loop settles."""
+    """With ours u grows for all of 50 periods though K is stable; with a W_1 that asks for less the loop settles."""
     limit = printed()["delay_free"]["limit"]
     ours, others = (long_run(weights, None) for weights in ("ours", "others"))
     assert DESIGNS["ours"]().blocks["K"].is_stable
