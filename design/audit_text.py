@@ -62,9 +62,8 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
     bandwidth = design.anti_windup["corrected"]["bandwidth"]
     lines += [
         "",
-        f"The best found of (2.23) with no pole beyond {bandwidth:g} rad/s: alpha = {alpha:.4g} s, beta = {beta:.4g} s, "
-        "gamma = "
-        f"{gamma:.4g}, f = {f:.4g}.",
+        f"The best found of (2.23) with no pole beyond {bandwidth:g} rad/s: alpha = {alpha:.4g} s, "
+        f"beta = {beta:.4g} s, gamma = {gamma:.4g}, f = {f:.4g}.",
     ]
     if bound_block(design.additive_bound).relative_degree > 0:
         lines.append("Without such a bound on the poles there is none: f vanishes as alpha, beta -> 0 and gamma -> -1.")
