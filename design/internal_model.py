@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
+from flint import arb
 
-from design.block import (
-    Block,
-    from_polynomial,
-    geometric_scale,
-    plant_block,
-    plant_denominator,
-    plant_numerator,
-    polynomial,
-)
+from design.ball import decided, line, polynomial_roots
+from design.block import Block, plant_block, plant_denominator, plant_numerator
 from identification.files import InputError
 from identification.plant import PlantModel
 
@@ -84,12 +77,25 @@ def internal_model(plant: PlantModel, omega: float, epsilon: float) -> InternalM
     fill = max(0, len(B.zeros) - 4)
     fastest = max((abs(root) for root in A.zeros + B.zeros if root != 0), default=omega)
     Lambda = reference_polynomial(omega, epsilon) * Block(1.0, (complex(-fastest),) * fill)
-    q = 2.0 ** round(math.log2(geometric_scale(A, Lambda)))  # powers of 2 scale without rounding
-    difference = np.polysub(polynomial(Lambda, q), polynomial(A, q))
     return InternalModel(
         Lambda=Lambda,
         F1=plant_block(plant.without_delay()),
-        F2=from_polynomial(difference, q) * B.inverse(),  # Eq. (2.5)
+        F2=_difference(Lambda, A) * B.inverse(),  # Eq. (2.5)
         G_A=B * Lambda.inverse(),  # Eq. (2.6)
         one_plus_F=Lambda * A.inverse(),  # Eq. (2.4)
     )
+
+
+def _difference(first: Block, second: Block) -> Block:
+    """The difference of two polynomial blocks, whose coefficients spread over too many decades for doubles."""
+
+    def compute() -> Block:
+        x = line(0.0, first, second)
+        polynomial = x.gain(first) * x.polynomial(first.zeros) - x.gain(second) * x.polynomial(second.zeros)
+        roots = tuple(x.back(root) for root in polynomial_roots(polynomial))
+        return Block(float(polynomial[len(roots)] / arb(x.unit) ** len(roots)), roots)
+
+    found = decided(compute)
+    if found is None:
+        raise InputError("the zeros of F2, roots of Lambda - A, are not told apart; expected another reference")
+    return found
