@@ -48,7 +48,7 @@ def corrected_options(command: Callable[..., None]) -> Callable[..., None]:
         click.option(
             "--recovery",
             type=float,
-            help="Corrected anti-windup: time in s for y_d to fall to 1 %; as the loop's own transients unless given.",
+            help="Corrected anti-windup: most time in s for y_d to fall to 1 %; that of the loop itself unless given.",
         ),
     ):
         command = option(command)
@@ -199,7 +199,7 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
     click.echo(f"{design.kind} design -> {output}")
     click.echo(f"  {summary}")
     for name, judged in design.anti_windup.items():
-        sector = "any" if judged["popov_sector"] is None else f"{judged['popov_sector']:.4g}"
+        sector = "any" if judged["popov_sector"] is None else lower_end(judged["popov_sector"], 4)
         stable = "stable" if judged["theta2_stable"] else "NOT stable: a lasting offset after saturation"
         click.echo(f"  anti-windup {name:9s} f = {judged['f']:.4g}, Popov sector {sector}, theta2 {stable}")
 

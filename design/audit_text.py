@@ -177,7 +177,7 @@ def _anti_windup_rows(found: Audit, windup: float) -> list[Sequence[str]]:
                 name,
                 f"{judged.f:.4g}",
                 f"{judged.f_omega:.4g}",
-                "any" if judged.popov_sector is None else f"{judged.popov_sector:.4g}",
+                "any" if judged.popov_sector is None else lower_end(judged.popov_sector, 4),
                 f"{1 / multiplier:.4g}" if multiplier else "circle",
                 "none" if sector == 0 else ("any" if np.isinf(sector) else f"{sector:.4g}"),
                 f"{judged.theta1_tilde_at_zero:.4g}",

@@ -51,7 +51,12 @@ class Corrected:
 
 
 def corrected(
-    unstable: tuple[complex, ...], bound: AdditiveBound, recovery_s: float, sector: float, bandwidth: float
+    unstable: tuple[complex, ...],
+    bound: AdditiveBound,
+    recovery_s: float,
+    sector: float,
+    bandwidth: float,
+    faster: bool = True,
 ) -> Corrected:
     """The theta1~ of least f found in a class whose theta2 is stable, for a stated sector, recovery time and bandwidth.
 
@@ -73,6 +78,8 @@ def corrected(
         k of Theorem 2.3.1, between 0 and 1: with limits +-L the dead zone lies in it as long as |u| <= L/(1 - k).
     bandwidth
         In rad/s, no less than ln(100)/recovery_s; no pole of theta1~ is faster.
+    faster
+        Whether rate may exceed the least one of the lattice that the recovery time allows.
 
     Raises
     ------
@@ -113,8 +120,10 @@ def corrected(
     slowest = bandwidth / 10**decades
     search = _Search(unstable, bound, sector, bandwidth, slowest)
     i, j = (each.ravel() for each in np.indices((int(RATES * decades) + 1, int(SPREAD / COARSE * decades) + 1)))
+    if not faster:
+        i, j = i[i == i.max()], j[i == i.max()]
     j = j * COARSE
-    first = (i % 4 == 0) & (j % (8 * COARSE) == 0)
+    first = ((i - i.min()) % 4 == 0) & (j % (8 * COARSE) == 0)
     lower, proved = np.zeros((2, len(i)))
     for points in (first, ~first):
         lower[points], proved[points] = search.run(i[points], j[points])

@@ -125,8 +125,9 @@ def compensators(
     own_s
         Time in seconds in which the design's own transients fall to 1 %.
     recovery_s, sector
-        Of the corrected compensator, see :func:`design.corrected.corrected`; unless given, the recovery takes
-        ``own_s`` at most.
+        Of the corrected compensator, see :func:`design.corrected.corrected`. A recovery time that is given is a bound;
+        unless given, the slowest mode takes ``own_s``, to the lattice of the poles: one much faster than the loop may
+        have a smaller f, and answers a saturation with a control many times the limits.
     bandwidth
         Of the corrected compensator in rad/s; unless given, that of the fastest root of the plant and of W_a, which is
         as far as the model says anything, and at least ten times the rate ln(100)/own_s. It does not depend on
@@ -142,8 +143,8 @@ def compensators(
     if bandwidth is None:
         fastest = fastest_root(plant_block(model.plant), bound_block(bound))
         bandwidth = max(fastest, 10 * float(np.log(1 / SETTLED)) / own_s)
-    recovery_s = own_s if recovery_s is None else recovery_s
-    found = corrected(plant_block(model.plant).unstable_poles, bound, recovery_s, sector, bandwidth)
+    unstable, pace = plant_block(model.plant).unstable_poles, own_s if recovery_s is None else recovery_s
+    found = corrected(unstable, bound, pace, sector, bandwidth, faster=recovery_s is not None)
     return {
         "thesis": {"alpha": alpha, "beta": beta, "gamma": gamma} | facts(model, second_order(alpha, beta, gamma)),
         "corrected": {"sector": sector, "bandwidth": bandwidth, "f_lower": found.f_lower}

@@ -222,7 +222,10 @@ class PeakProgram:
             if solution.status == 0:
                 break
         else:
-            raise InputError(f"the linear program of the least error was not solved ({solution.message})")
+            raise InputError(
+                "the linear program of the least error was not solved; expected a limit nearer to the control that the "
+                f"reference takes (the solver says: {' '.join(str(solution.message).split())})"
+            )
         u, prices = np.clip(np.asarray(solution.x)[control], -1.0, 1.0), np.asarray(solution.ineqlin.marginals)
         weights = prices[: len(counted)] - prices[len(counted) :]
         if self._centred:
