@@ -53,7 +53,7 @@ TABLES := additive_error f_gamma delay_free extended trade_off interpolation rob
 	sampled campaign
 
 IDENTIFICATION := $(wildcard identification/*.py)
-CONTRACT := $(addprefix identification/,files.py plant.py model.py thesis.py) $(THESIS)
+CONTRACT := $(addprefix identification/,files.py digits.py plant.py model.py thesis.py) $(THESIS)
 ENGINE := $(addprefix experiments/,__main__.py tables.py closed_loop.py compiled_loop.py saturated_loop.py taylor.py \
 	propagator.py signals.py mesh.py crossings.py loops.py scenarios.py steady_control.py metrics.py)
 TRACKING := $(ENGINE) $(addprefix experiments/,tracking.py pade.py)

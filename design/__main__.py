@@ -16,9 +16,9 @@ from design.audit_text import audit_text
 from design.block import from_polynomial
 from design.contract import Design, read_design
 from design.delay_free import design_delay_free
-from design.digits import lower_end, upper_end
 from design.extended import METHODS, design_extended
 from design.judgement import SECTOR, facts
+from identification.digits import lower_end, upper_end
 from identification.files import CommandGroup, InputError, write_whole
 from identification.model import IdentifiedModel, read_model
 from identification.thesis import printed

@@ -10,10 +10,10 @@ import numpy as np
 from design.audit import Audit
 from design.block import bound_block
 from design.contract import Design
-from design.digits import lower_end, upper_end
 from design.mixed_sensitivity import Infimum, Synthesis
 from design.robustness import Margins
 from design.stable_intervals import LARGEST, Interval, Margin
+from identification.digits import lower_end, upper_end
 from identification.plant import PlantModel
 
 NAMED = 6  # intervals of stability that are named, of each kind

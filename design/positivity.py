@@ -60,14 +60,8 @@ def not_positive_at(polynomial: Sequence[Fraction]) -> float | None:
 
 def squared_magnitude(roots: Sequence[complex]) -> Polynomial:
     """prod |j omega - root|^2 as a polynomial in x = omega^2; the roots in conjugate pairs, as a block has them."""
-    product = [Fraction(1)]
-    for root in roots:
-        a, b = Fraction(root.real), Fraction(root.imag)
-        if b == 0:
-            product = multiplied(product, [a * a, Fraction(1)])
-        elif b > 0:
-            product = multiplied(product, [(a * a + b * b) ** 2, 2 * (a * a - b * b), Fraction(1)])
-    return product
+    polynomial = real_polynomial(roots)
+    return _on_axis(multiplied(polynomial, _reflected(polynomial)))
 
 
 def real_polynomial(roots: Sequence[complex]) -> Polynomial:
@@ -84,10 +78,19 @@ def real_polynomial(roots: Sequence[complex]) -> Polynomial:
 
 def popov_polynomial(block: Block, multiplier: float) -> Polynomial:
     """Re (1 + j m omega) block(j omega) times |denominator|^2, as a polynomial in x = omega^2."""
-    reflected = [value if k % 2 == 0 else -value for k, value in enumerate(real_polynomial(block.poles))]
-    product = multiplied(multiplied(real_polynomial(block.zeros), reflected), [Fraction(1), Fraction(multiplier)])
+    product = multiplied(real_polynomial(block.zeros), _reflected(real_polynomial(block.poles)))
     gain = Fraction(block.gain)
-    return [gain * value * (-1) ** k for k, value in enumerate(product[::2])]
+    return [gain * value for value in _on_axis(multiplied(product, [Fraction(1), Fraction(multiplier)]))]
+
+
+def _reflected(polynomial: Polynomial) -> Polynomial:
+    """p(-s)."""
+    return [value if k % 2 == 0 else -value for k, value in enumerate(polynomial)]
+
+
+def _on_axis(polynomial: Polynomial) -> Polynomial:
+    """The real part of p(j omega) as a polynomial in x = omega^2."""
+    return [value * (-1) ** k for k, value in enumerate(polynomial[::2])]
 
 
 def multiplied(left: Sequence[Fraction], right: Sequence[Fraction]) -> Polynomial:

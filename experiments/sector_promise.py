@@ -28,12 +28,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from design.digits import told_apart
 from experiments.closed_loop import Run, simulate
 from experiments.guarantee import Guarantee, sector_text
 from experiments.saturated_loop import SaturatedLoop
 from experiments.scenarios import Reference, SampledReference
 from experiments.steady_control import response
+from identification.digits import told_apart
 from identification.plant import PlantModel
 
 A_EXCURSION = 64  # samples of u between two crossings of the limits, at least

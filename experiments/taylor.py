@@ -87,10 +87,8 @@ def integrate(
     wrap = room - 1
     cursor, filled = np.zeros(k, np.int64), np.zeros(k, np.int64)
     queue, queued = np.empty(room), 0  # mesh points to come: the images of kinks
-    fresh, past = (
-        np.zeros(k),
-        np.zeros((k, most + 1)),
-    )  # until when a brief dead time reaches back beyond a kink, and to what
+    # until when a brief dead time reaches back beyond a kink, and to what
+    fresh, past, some_brief = np.zeros(k), np.zeros((k, most + 1)), brief.any()
 
     z, P, W = np.zeros(increments.shape[2]), np.zeros((1 + k, most + 1)), np.zeros(most + 1)
     sizes, terms, later, negligible = np.zeros(len(z)), np.zeros(n), np.zeros(n), np.zeros(1 + k)
@@ -140,7 +138,6 @@ def integrate(
                 cursor[j] += 1
             if brief[j] and t >= fresh[j]:
                 continue
-            W[:] = 0.0
             if middle < 0:
                 W[0], degree = rest[j], 0
             else:
@@ -154,7 +151,9 @@ def integrate(
                 if abs(moved) > 4e-16 * (step + t):  # else the same time, to rounding
                     shift(W, degree, moved / step, work)
             if brief[j]:
-                past[j] = W
+                past[j] = 0.0
+                for i in range(degree + 1):
+                    past[j, i] = W[i]
                 continue
             filled[j] = fill(z, n, k, j, W, degree, min(1.0, (t_next - t) / step + BEYOND), NEGLIGIBLE * size[1 + j])
             known = max(known, filled[j])
@@ -165,7 +164,7 @@ def integrate(
         z[n] = 0.0 if mode == 0 else (high if mode == 1 else low)
         radius = min(1.0, (t_next - t) / step + BEYOND)
         degree, power = unfold(tables, which, k, z, sizes, known, radius, usual, size, negligible, P, terms)
-        for trial in range(TRIALS if brief.any() else 0):
+        for trial in range(TRIALS if some_brief else 0):
             settled = True
             for j in range(k):
                 if brief[j]:

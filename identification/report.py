@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from decimal import ROUND_FLOOR, Context
 from math import floor, log10
 from typing import Any
 
+from identification.digits import lower_end
 from identification.fit import FitResult
 from identification.frequency_response import FrequencyResponse
 from identification.model import plant_to_dict
@@ -117,10 +117,10 @@ def bound_remarks(report: BoundReport) -> list[str]:
     """Sentences on how W_a lies over the residuals."""
     first = report.touches[0]
     where = "between the lines, where only its own fit speaks," if first.between_lines else "at a line"
-    least = float(Context(prec=3, rounding=ROUND_FLOOR).create_decimal(repr(float(report.least_excess))))
+    least = lower_end(report.least_excess, 3)
     return [
         f"W_a is {report.mean_excess:.3g} times the residuals' envelope on average and {report.largest_excess:.3g} "
-        f"times at most; no W_a of order {report.bound.order} gets below {least:.3g}",
+        f"times at most; no W_a of order {report.bound.order} gets below {least}",
         f"it touches the residual of {first.test} {where} at {first.omega:.4g} rad/s",
     ]
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pandas as pd
 
-from design.digits import lower_end, told_apart, upper_end
 from experiments.guarantee import sector_text
 from experiments.metrics import settling_time
+from identification.digits import lower_end, told_apart, upper_end
 from identification.files import InputError
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from design.contract import Design
-from design.digits import lower_end, upper_end
+from identification.digits import lower_end, upper_end
 from paper_figures.captions import apart, number, of_run, only, promises, required_input, time_unit
 from paper_figures.summary_of_fit import Table
 

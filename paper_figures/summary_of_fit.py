@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
-from design.digits import lower_end
+from identification.digits import lower_end
 from identification.files import InputError
 from identification.frequency_response import FrequencyResponse
 from identification.model import IdentifiedModel, plant_to_dict

@@ -12,7 +12,6 @@ import pytest
 from other_units import Units
 
 from design.contract import Design
-from design.digits import told_apart
 from experiments import interpolation_regions
 from experiments.delay_free import delay_free_tables
 from experiments.extended import extended_tables
@@ -20,6 +19,7 @@ from experiments.guarantee import Guarantee, sector_text
 from experiments.interpolation_regions import interpolation_tables
 from experiments.sampled_rates import sampled_rates_tables
 from experiments.sector_promise import Verdict
+from identification.digits import told_apart
 from paper_figures.captions import apart, duration, number, sampling_rate
 from paper_figures.summary_of_designs import loop_table, sentences
 

@@ -13,8 +13,8 @@ from design.ball import UndecidedError, decided, negative_pivot, polynomial_root
 from design.block import Block
 from design.closed_loop import closed_loop_norm
 from design.delay_free import stabiliser_problem
-from design.digits import lower_end, upper_end
 from design.mixed_sensitivity import Synthesis, mixed_sensitivity
+from identification.digits import lower_end, upper_end
 from identification.model import IdentifiedModel
 from identification.plant import AdditiveBound, Mode, PlantModel
 
