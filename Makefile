@@ -28,7 +28,6 @@ RESULTS := $(BUILD)/results
 FIGURES := $(BUILD)/figures
 SUMMARY := $(addprefix $(BUILD)/summary.,pdf svg png txt)
 REPORT := $(BUILD)/report/index.html
-THESIS := data/thesis/thesis.toml
 
 # The model that everything downstream is for: the one fitted from SWEEPS, unless MODEL names another.
 FITTED := $(BUILD)/model.json
@@ -44,7 +43,7 @@ IN_FOLDERS := $(if $(FOLDERS),find -L $(FOLDERS) -maxdepth 1 -type f \
 
 LIMITS := $(if $(LIMIT),--limit $(LIMIT))
 
-NAMES := $(sort $(basename $(notdir $(wildcard paper_figures/fig_*.py))))
+NAMES := $(sort $(basename $(notdir $(wildcard paper_figures/thesis/figures/fig_*.py))))
 DATA_NAMES := fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14 fig_4_01 fig_4_02 fig_4_03 fig_4_04 \
 	fig_a_01 fig_a_02 fig_a_03 fig_a_04 fig_a_05 fig_a_06
 FORMATS := pdf svg png txt
@@ -52,11 +51,14 @@ DESIGNS := $(addprefix $(BUILD)/,design_delay_free.json design_extended.json des
 TABLES := additive_error f_gamma delay_free extended trade_off interpolation robustness limits_delay_free limits_extended \
 	sampled campaign
 
-IDENTIFICATION := $(wildcard identification/*.py)
-CONTRACT := $(addprefix identification/,files.py digits.py plant.py model.py thesis.py) $(THESIS)
-ENGINE := $(addprefix experiments/,__main__.py tables.py closed_loop.py compiled_loop.py saturated_loop.py taylor.py \
-	propagator.py signals.py mesh.py crossings.py loops.py scenarios.py steady_control.py metrics.py)
-TRACKING := $(ENGINE) $(addprefix experiments/,tracking.py pade.py)
+# The files that each command runs, CODE-ROOM-COMMAND, and that each figure draws with, CODE-FIGURE.
+SOURCES := $(shell find identification design experiments paper_figures data/thesis -name '*.py')
+build/prerequisites.mk: tools/prerequisites.py $(SOURCES)
+	@mkdir -p $(@D)
+	@$(PYTHON) $< $@
+ifneq (,$(filter-out help test lint bench study referee clean,$(or $(MAKECMDGOALS),help)))
+-include build/prerequisites.mk
+endif
 
 .PHONY: help figures report refit claims test bench study referee lint clean
 help: ## say what there is
@@ -138,97 +140,91 @@ keeping = if $(1) 2> $(2); then cat $(2) >&2; rm $(2); elif [ $$? != 2 ]; then c
 tables = $(addprefix $(RESULTS)/$(1),.csv _summary.csv)
 drawing = $(foreach format,$(FORMATS),$(1:%=$(FIGURES)/%.$(format)))
 
-$(FITTED): $(SWEEP_FILES) $(IDENTIFICATION) $(if $(MODEL),,$(CHOICE)) | $(READY)
+$(FITTED): $(SWEEP_FILES) $(CODE-identification-fit) $(if $(MODEL),,$(CHOICE)) | $(READY)
 	$(if $(REFIT),@rm -rf $@ $(SUMMARY) $(REPORT) $(call drawing,$(DATA_NAMES)) $(BUILD)/design_* $(TABLES:%=$(RESULTS)/%*))
 	$(PY) -m identification fit $(SWEEPS) $(FIT) --output $@
 
 # Chapter 2 and chapters 3 and 4, with the thesis's references and free parameters.
-$(BUILD)/design_delay_free.json: $(MODEL_FILE) $(CHOICE) $(wildcard design/*.py) $(CONTRACT) | $(READY)
-	$(call attempt,$(PY) -m design delay-free $(CHOSEN) --period 4 --output $@,$@,,$(basename $@))
+$(BUILD)/design_delay_free.json: $(MODEL_FILE) $(CHOICE) $(CODE-design-delay-free) | $(READY)
+	$(call attempt,$(PY) -m design delay-free $(CHOSEN) --period 4 --epsilon 1e-4 --output $@,$@,,$(basename $@))
 
-$(BUILD)/design_extended.json: $(MODEL_FILE) $(CHOICE) $(wildcard design/*.py) $(CONTRACT) | $(READY)
+$(BUILD)/design_extended.json: $(MODEL_FILE) $(CHOICE) $(CODE-design-extended) | $(READY)
 	$(call attempt,$(PY) -m design extended $(CHOSEN) --reference-omega 1.5 --a 4 --e 2 --f 1 --output $@,$@,,\
 		$(basename $@))
 
 # The same with a roll-off, so that W_a guarantees the loop's stability.
-$(BUILD)/design_robust.json: $(MODEL_FILE) $(CHOICE) $(wildcard design/*.py) $(CONTRACT) | $(READY)
+$(BUILD)/design_robust.json: $(MODEL_FILE) $(CHOICE) $(CODE-design-extended) | $(READY)
 	$(call attempt,$(PY) -m design extended $(CHOSEN) --reference-omega 1.5 --a 4 --e 2 --f 1 --robust-level 0.9 --output $@,\
 		$@,,$(basename $@))
 
-$(call tables,pid) &: experiments/pid.py $(ENGINE) $(THESIS) | $(READY)
-	$(PY) -m experiments pid --output $(RESULTS)
+$(call tables,pid) &: $(CODE-thesis-pid) | $(READY)
+	$(PY) -m experiments thesis pid --output $(RESULTS)
 
 $(call tables,additive_error) &: \
-		$(MODEL_FILE) $(CHOICE) $(SWEEP_FILES) experiments/additive_error.py $(IDENTIFICATION) $(THESIS) | $(READY)
-	$(PY) -m experiments additive-error $(CHOSEN) $(SWEEPS) --output $(RESULTS)
+		$(MODEL_FILE) $(CHOICE) $(SWEEP_FILES) $(CODE-thesis-additive-error) | $(READY)
+	$(PY) -m experiments thesis additive-error $(CHOSEN) $(SWEEPS) --output $(RESULTS)
 
-$(call tables,f_gamma) &: $(BUILD)/design_extended.json experiments/f_gamma.py | $(READY)
-	$(call attempt,$(PY) -m experiments f-gamma $< --output $(RESULTS),$(call tables,f_gamma),$<,\
+$(call tables,f_gamma) &: $(BUILD)/design_extended.json $(CODE-thesis-f-gamma) | $(READY)
+	$(call attempt,$(PY) -m experiments thesis f-gamma $< --output $(RESULTS),$(call tables,f_gamma),$<,\
 		$(RESULTS)/f_gamma)
 
 $(call tables,delay_free) &: \
-		$(BUILD)/design_delay_free.json experiments/delay_free.py $(TRACKING) | $(READY)
-	$(call attempt,$(PY) -m experiments delay-free $< $(LIMITS) --output $(RESULTS),$(call tables,delay_free),$<,\
+		$(BUILD)/design_delay_free.json $(CODE-thesis-delay-free) | $(READY)
+	$(call attempt,$(PY) -m experiments thesis delay-free $< $(LIMITS) --output $(RESULTS),$(call tables,delay_free),$<,\
 		$(RESULTS)/delay_free)
 
 $(call tables,extended) &: \
-		$(BUILD)/design_extended.json experiments/extended.py $(TRACKING) | $(READY)
-	$(call attempt,$(PY) -m experiments extended $< $(LIMITS) --output $(RESULTS),$(call tables,extended),$<,\
+		$(BUILD)/design_extended.json $(CODE-thesis-extended) | $(READY)
+	$(call attempt,$(PY) -m experiments thesis extended $< $(LIMITS) --output $(RESULTS),$(call tables,extended),$<,\
 		$(RESULTS)/extended)
 
-$(call tables,trade_off) &: $(BUILD)/design_extended.json experiments/trade_off.py | $(READY)
-	$(call attempt,$(PY) -m experiments trade-off $< --output $(RESULTS),$(call tables,trade_off),$<,\
+$(call tables,trade_off) &: $(BUILD)/design_extended.json $(CODE-thesis-trade-off) | $(READY)
+	$(call attempt,$(PY) -m experiments thesis trade-off $< --output $(RESULTS),$(call tables,trade_off),$<,\
 		$(RESULTS)/trade_off)
 
 INTERPOLATION := $(call tables,interpolation) $(RESULTS)/interpolation_map.csv
-$(INTERPOLATION) &: $(BUILD)/design_extended.json experiments/interpolation_regions.py | $(READY)
-	$(call attempt,$(PY) -m experiments interpolation $< --output $(RESULTS),$(INTERPOLATION),$<,\
+$(INTERPOLATION) &: $(BUILD)/design_extended.json $(CODE-thesis-interpolation) | $(READY)
+	$(call attempt,$(PY) -m experiments thesis interpolation $< --output $(RESULTS),$(INTERPOLATION),$<,\
 		$(RESULTS)/interpolation)
 
 ROBUSTNESS := $(BUILD)/design_extended.json $(BUILD)/design_robust.json
-$(call tables,robustness) &: $(ROBUSTNESS) experiments/robustness.py | $(READY)
-	$(call attempt,$(PY) -m experiments robustness $(ROBUSTNESS) --output $(RESULTS),$(call tables,robustness),$(ROBUSTNESS),\
+$(call tables,robustness) &: $(ROBUSTNESS) $(CODE-thesis-robustness) | $(READY)
+	$(call attempt,$(PY) -m experiments thesis robustness $(ROBUSTNESS) --output $(RESULTS),$(call tables,robustness),$(ROBUSTNESS),\
 		$(RESULTS)/robustness)
 
-BOUNDS := $(addprefix experiments/,linear_programs.py certificates.py cells.py exact_chain.py intervals.py)
-LIMITED := $(TRACKING) $(BOUNDS) experiments/physical_limits.py
-$(call tables,limits_delay_free) &: $(BUILD)/design_delay_free.json $(LIMITED) | $(READY)
-	$(call attempt,$(PY) -m experiments limits $< --output $(RESULTS),$(call tables,limits_delay_free),$<,\
+$(call tables,limits_delay_free) &: $(BUILD)/design_delay_free.json $(CODE-thesis-limits) | $(READY)
+	$(call attempt,$(PY) -m experiments thesis limits $< --output $(RESULTS),$(call tables,limits_delay_free),$<,\
 		$(RESULTS)/limits_delay_free)
 
-$(call tables,limits_extended) &: $(BUILD)/design_extended.json $(LIMITED) | $(READY)
-	$(call attempt,$(PY) -m experiments limits $< --output $(RESULTS),$(call tables,limits_extended),$<,\
+$(call tables,limits_extended) &: $(BUILD)/design_extended.json $(CODE-thesis-limits) | $(READY)
+	$(call attempt,$(PY) -m experiments thesis limits $< --output $(RESULTS),$(call tables,limits_extended),$<,\
 		$(RESULTS)/limits_extended)
 
-SAMPLED := $(TRACKING) $(addprefix experiments/,sampled_rates.py sampled.py sampled_steps.py sampled_controller.py extended.py)
-$(call tables,sampled) &: $(BUILD)/design_extended.json $(SAMPLED) | $(READY)
-	$(call attempt,$(PY) -m experiments sampled-rates $< $(LIMITS) --output $(RESULTS),$(call tables,sampled),$<,\
+$(call tables,sampled) &: $(BUILD)/design_extended.json $(CODE-thesis-sampled-rates) | $(READY)
+	$(call attempt,$(PY) -m experiments thesis sampled-rates $< $(LIMITS) --output $(RESULTS),$(call tables,sampled),$<,\
 		$(RESULTS)/sampled)
 
 CAMPAIGN := $(RESULTS)/campaign.parquet
-$(CAMPAIGN): $(BUILD)/design_extended.json $(TRACKING) $(addprefix experiments/,uncertain_plants.py additive_distance.py \
-		perturbed_stability.py campaign.py campaign_command.py campaign_file.py campaign_workers.py extended.py delay_free.py) | $(READY)
+$(CAMPAIGN): $(BUILD)/design_extended.json $(CODE-thesis-campaign) | $(READY)
 	@rm -rf $@.parts
-	$(call attempt,$(PY) -m experiments campaign $< --plants $(PLANTS) --seed 1 $(LIMITS) --output $@,$@,$<,\
+	$(call attempt,$(PY) -m experiments thesis campaign $< --plants $(PLANTS) --seed 1 $(LIMITS) --output $@,$@,$<,\
 		$(RESULTS)/campaign)
 
 DISTRIBUTIONS := $(call tables,campaign) $(RESULTS)/campaign_distance.csv
-$(DISTRIBUTIONS) &: $(CAMPAIGN) experiments/campaign_tables.py | $(READY)
+$(DISTRIBUTIONS) &: $(CAMPAIGN) $(CODE-experiments-campaign-tables) | $(READY)
 	$(call attempt,$(PY) -m experiments campaign-tables $< --output $(RESULTS),$(DISTRIBUTIONS),$<)
 
 # What the thesis does not print: about its text, whatever the MODEL.
-CONDITIONS := $(TRACKING) $(BOUNDS) $(addprefix experiments/,unprinted_conditions.py unprinted_weights.py joint_conditions.py \
-	initial_output.py printed_outcomes.py printed_number.py claims.py claims_inputs.py claims_runs.py claims_statements.py thesis_designs.py pid.py extended.py delay_free.py)
-$(call tables,conditions) &: $(CONDITIONS) $(wildcard design/*.py) $(CONTRACT) data/thesis/claims.csv | $(READY)
-	$(PY) -m experiments conditions --output $(RESULTS)
+$(call tables,conditions) &: $(CODE-thesis-conditions) data/thesis/claims.csv | $(READY)
+	$(PY) -m experiments thesis conditions --output $(RESULTS)
 
 LEDGER := $(addprefix data/thesis/,claims.csv exceptions.csv coverage.json)
-$(BUILD)/claims.csv $(BUILD)/claims.txt CLAIMS.md &: $(LEDGER) $(wildcard experiments/*.py design/*.py) $(CONTRACT) | $(READY)
+$(BUILD)/claims.csv $(BUILD)/claims.txt CLAIMS.md &: $(LEDGER) $(CODE-thesis-claims) $(CODE-checks) | $(READY)
 	@mkdir -p $(BUILD)
-	$(PY) -m experiments claims --output $(BUILD) --page CLAIMS.md > $(BUILD)/claims.txt
+	$(PY) -m experiments thesis claims --output $(BUILD) --page CLAIMS.md > $(BUILD)/claims.txt
 
-docs/equations.md: data/thesis/equations.csv experiments/equations_page.py | $(READY)
-	@$(PY) -m experiments equations --page $@
+docs/equations.md: data/thesis/equations.csv $(CODE-thesis-equations) | $(READY)
+	@$(PY) -m experiments thesis equations --page $@
 
 define feeds
 $(call drawing,$(2)): $(call tables,$(1))
@@ -249,26 +245,19 @@ $(eval $(call feeds,campaign,fig_a_06))
 $(call drawing,fig_a_06): $(RESULTS)/campaign_distance.csv
 $(eval $(call feeds,conditions,fig_a_07))
 
-$(call drawing,fig_2_02 fig_2_03 fig_2_04): $(addprefix paper_figures/,pid.py panels.py captions.py)
-$(call drawing,fig_2_09 fig_2_10 fig_2_11 fig_2_12 fig_2_13 fig_2_14): $(addprefix paper_figures/,panels.py captions.py)
-$(call drawing,fig_2_10 fig_2_11): paper_figures/f_gamma.py
-$(call drawing,fig_4_01 fig_4_02 fig_4_03 fig_4_04): $(addprefix paper_figures/,extended.py panels.py captions.py)
-$(call drawing,fig_a_01 fig_a_02 fig_a_03 fig_a_04 fig_a_05 fig_a_06 fig_a_07): $(addprefix paper_figures/,panels.py captions.py)
-
 DIAGRAMS := fig_2_01 fig_2_05 fig_2_06 fig_2_07 fig_2_08 fig_3_01 fig_3_02
-$(call drawing,$(DIAGRAMS)): paper_figures/block_diagrams.py
 
-STYLE := paper_figures/__main__.py paper_figures/style.py paper_figures/thesis.mplstyle
-$(foreach format,$(FORMATS),$(FIGURES)/%.$(format)): paper_figures/%.py $(STYLE) | $(READY)
+$(foreach name,$(NAMES),$(eval $(call drawing,$(name)): $(CODE-$(name))))
+
+$(foreach format,$(FORMATS),$(FIGURES)/%.$(format)): $(CODE-paper_figures-draw) | $(READY)
 	$(call attempt,$(PY) -m paper_figures draw $* --results $(RESULTS) --output $(FIGURES),$(call drawing,$*),\
 		$(filter $(RESULTS)/%,$^))
 
 $(SUMMARY) &: $(FITTED) $(CHOICE) $(SWEEP_FILES) $(DESIGNS) $(foreach table,$(TABLES),$(call tables,$(table))) \
-		$(wildcard paper_figures/summary*.py) $(addprefix paper_figures/,panels.py captions.py) $(STYLE) | $(READY)
+		$(CODE-paper_figures-summary) | $(READY)
 	$(PY) -m paper_figures summary $(FITTED) $(SWEEPS) --build $(BUILD)
 
 $(REPORT): $(foreach format,svg txt,$(NAMES:%=$(FIGURES)/%.$(format))) $(BUILD)/claims.csv $(MODEL_FILE) $(CHOICE) $(SWEEP_FILES) \
 		$(DESIGNS) $(foreach table,pid $(TABLES),$(call tables,$(table))) $(INTERPOLATION) $(DISTRIBUTIONS) requirements.lock \
-		$(THESIS) data/thesis/claims.csv $(wildcard paper_figures/report* paper_figures/summary_of_*.py design/*.py) \
-		paper_figures/captions.py $(STYLE) | $(READY)
+		data/thesis/claims.csv $(CODE-paper_figures-report) | $(READY)
 	$(PY) -m paper_figures report $(CHOSEN) $(SWEEPS) --build $(BUILD)

@@ -25,13 +25,13 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from design.contract import Design
-from design.extended import design_extended
-from experiments.closed_loop import simulate
-from experiments.loops import design_loop
-from experiments.scenarios import Reference, SampledReference, sinusoid
-from identification.files import InputError
-from identification.model import read_model
+from data.thesis import model_named
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.references import Reference, SampledReference, sinusoid
+from identification.base.errors import InputError
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "unit"))
 from collocation import collocated_run
@@ -59,7 +59,7 @@ class Entry:
 
 @lru_cache
 def design_at(delay_s: float) -> Design:
-    model = read_model("implied")
+    model = model_named("implied")
     plant = dataclasses.replace(model.plant, delay_s=delay_s)
     return design_extended(dataclasses.replace(model, plant=plant), [1.5], 4.0, [(2.0, 1.0)])
 

@@ -1,4 +1,4 @@
-/* The algorithm of experiments/taylor.py, propagator.py, mesh.py and crossings.py in plain C: the limit of its speed.
+/* The algorithm of experiments/engine/integrator.py, propagator.py, mesh.py and crossings.py in plain C: the limit of its speed.
 
    The tables come from Python, as they do there. References in pieces are left out: the benchmark has none. */
 #include <math.h>

@@ -19,13 +19,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from design.extended import design_extended
-from experiments.closed_loop import simulate
-from experiments.loops import design_loop
-from experiments.saturated_loop import SaturatedLoop
-from experiments.scenarios import thesis_reference
-from identification.model import IdentifiedModel, read_model
-from identification.plant import Mode, PlantModel
+from data.thesis import model_named
+from design.chapters_3_4.design_extended import design_extended
+from experiments.engine.saturated_loop import SaturatedLoop
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
+from experiments.thesis.printed_choices import thesis_reference
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import Mode, PlantModel
 
 OMEGA = 1.5  # of the reference, rad/s
 HORIZON_S = 30.0
@@ -54,7 +55,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, required=True, help="folder of the figure; it is made")
     folder = parser.parse_args().output
     folder.mkdir(parents=True, exist_ok=True)
-    implied = read_model("implied")
+    implied = model_named("implied")
     seeded = [(pairs, seed) for pairs in PAIRS for seed in range(PLANTS)]
     with tqdm(total=len(HORIZONS_S) + len(seeded) + len(DELAYS_S), disable=None, leave=False) as bar:
 
@@ -90,7 +91,7 @@ def random_plant(pairs: int, seed: int) -> PlantModel:
     omegas = np.sort(np.exp(random.uniform(np.log(50.0), np.log(0.9 * FASTEST), 2 * pairs)))
     omegas[-1] = FASTEST
     modes = [Mode(float(omega), float(random.uniform(0.01, 0.1))) for omega in omegas]
-    return replace(read_model("implied").plant, zero_modes=tuple(modes[::2]), pole_modes=tuple(modes[1::2]))
+    return replace(model_named("implied").plant, zero_modes=tuple(modes[::2]), pole_modes=tuple(modes[1::2]))
 
 
 def saturated_loop(model: IdentifiedModel) -> tuple[SaturatedLoop, float]:

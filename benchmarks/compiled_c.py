@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.compiled_loop import compile_loop
-from experiments.saturated_loop import SaturatedLoop
+from experiments.engine.compiled_loop import compile_loop
+from experiments.engine.saturated_loop import SaturatedLoop
 
 FLAGS = ["-std=c11", "-O3", "-march=native", "-funroll-loops"]
 REASSOCIATE = ["-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-fassociative-math"]  # as the engine may

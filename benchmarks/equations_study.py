@@ -28,7 +28,7 @@ import pandas as pd
 import pytest
 from tqdm import tqdm
 
-from experiments.equations_page import named_object, read_equations
+from experiments.thesis.claims.equations_page import named_object, read_equations
 
 ROOT = Path(__file__).resolve().parents[1]
 PROCESSES = 2

@@ -28,13 +28,13 @@ from functools import partial
 import numpy as np
 from tqdm import tqdm
 
-from identification.files import InputError
-from identification.fit import fit_plant
-from identification.frequency_response import FrequencyResponse
-from identification.least_squares import log_jacobian
-from identification.model import read_model
-from identification.plant import Mode, PlantModel
-from identification.structure import Structure
+from data.thesis import model_named
+from identification.base.errors import InputError
+from identification.fitting.fit_plant import fit_plant
+from identification.fitting.least_squares import log_jacobian
+from identification.model.plant import Mode, PlantModel
+from identification.model.structure import Structure
+from identification.sweeps.response import FrequencyResponse
 
 TESTS = 3
 FLOOR = 0.01
@@ -58,13 +58,13 @@ def structure_of(plant: PlantModel) -> Structure:
 
 
 def theta_of(plant: PlantModel) -> np.ndarray:
-    """The parameters of :class:`identification.structure.Structure`, modes sorted by omega."""
+    """The parameters of :class:`identification.model.structure.Structure`, modes sorted by omega."""
     values = [value for _, value in structure_of(plant).parameters(plant)]
     return np.append(np.log(np.abs(values[:-1])), values[-1])
 
 
 def thesis_plant(rng: np.random.Generator) -> PlantModel:
-    return read_model("implied").plant
+    return model_named("implied").plant
 
 
 def random_modes(rng: np.random.Generator, count: int) -> list[Mode]:

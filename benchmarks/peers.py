@@ -11,11 +11,11 @@ import symengine
 from jitcdde import jitcdde, t, y
 from jitcxde_common import conditional
 
-from design.block import Block, plant_block
-from design.contract import Design
-from design.realization import realize
-from experiments.saturated_loop import SaturatedLoop
-from experiments.scenarios import thesis_reference
+from design.blocks.block import Block, plant_block
+from design.blocks.state_space import realize
+from design.design_file import Design
+from experiments.engine.saturated_loop import SaturatedLoop
+from experiments.thesis.printed_choices import thesis_reference
 
 Peer = Callable[[], np.ndarray]
 

@@ -16,15 +16,15 @@ import pytest
 from compiled_c import c_run
 from peers import SAID_OF_JITCDDE, collapsed_response, jitcdde_run, pade_response
 
-from design.contract import Design
-from design.extended import design_extended
-from experiments.batch import simulate_many
-from experiments.closed_loop import Run, simulate
-from experiments.loops import design_loop
-from experiments.pade import with_pade
-from experiments.saturated_loop import SaturatedLoop
-from experiments.scenarios import thesis_reference
-from identification.model import read_model
+from data.thesis import model_named
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from experiments.engine.pade import with_pade
+from experiments.engine.saturated_loop import SaturatedLoop
+from experiments.engine.simulate import Run, simulate
+from experiments.runs.batch import simulate_many
+from experiments.runs.design_loop import design_loop
+from experiments.thesis.printed_choices import thesis_reference
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "unit"))
 from oracle import reference_run
@@ -37,7 +37,7 @@ PADE_S = 10.0  # python-control takes seconds for each second
 
 @pytest.fixture(scope="module")
 def design() -> Design:
-    return design_extended(read_model("implied"), [1.5], 4.0, [(2.0, 1.0)])
+    return design_extended(model_named("implied"), [1.5], 4.0, [(2.0, 1.0)])
 
 
 @pytest.fixture(scope="module")

@@ -9,22 +9,22 @@ from pathlib import Path
 
 import pytest
 
-from design.extended import design_extended
-from identification.model import read_model
+from data.thesis import model_named
+from design.chapters_3_4.design_extended import design_extended
 
 PROCESSES = 5
 
 SIMULATE = """
 import sys
 from pathlib import Path
-from design.contract import read_design
-from experiments.extended import extended_tables
+from design.design_file import read_design
+from experiments.thesis.studies.chapter_4 import extended_tables
 tables = extended_tables(read_design(Path(sys.argv[1])), 12.0)
 """
 
 DRAW = f"""{SIMULATE}
-from paper_figures import fig_4_03
-from paper_figures.style import styled
+from paper_figures.thesis.figures import fig_4_03
+from paper_figures.look.style import styled
 with styled():
     fig_4_03.draw(tables).savefig(sys.argv[2])
 """
@@ -33,7 +33,7 @@ with styled():
 @pytest.fixture(scope="module")
 def design_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("cold") / "design.json"
-    design = design_extended(read_model("implied"), [1.5], 4.0, [(2.0, 1.0)])
+    design = design_extended(model_named("implied"), [1.5], 4.0, [(2.0, 1.0)])
     path.write_text(design.to_json(), encoding="utf-8")
     return path
 

@@ -7,17 +7,16 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import least_squares
 
-from identification.fit import fit_plant
-from identification.frequency_response import read_sweeps
-from identification.least_squares import response_of
-from identification.model import read_model
-from identification.structure import Structure, Wanted
-from identification.thesis import DATA
+from data.thesis import THESIS, model_named
+from identification.fitting.fit_plant import fit_plant
+from identification.fitting.least_squares import response_of
+from identification.model.structure import Structure, Wanted
+from identification.sweeps.read_sweeps import read_sweeps
 
 
 def test_against_scipy_from_the_answer(against: Callable[..., object]) -> None:
-    test = read_sweeps([min((DATA / "elevation").glob("*_frf.csv"))])[0]
-    plant = read_model("implied").plant
+    test = read_sweeps([min((THESIS.parent / "elevation").glob("*_frf.csv"))])[0]
+    plant = model_named("implied").plant
     start = np.array(
         [
             np.log(plant.gain),

@@ -8,10 +8,10 @@ from collections.abc import Callable
 import control
 import pytest
 
-from design.block import Block
-from design.delay_free import design_delay_free
-from design.mixed_sensitivity import infimum, mixed_sensitivity
-from identification.model import read_model
+from data.thesis import model_named
+from design.blocks.block import Block
+from design.chapter_2.design_delay_free import design_delay_free
+from design.hinf.mixed_sensitivity import infimum, mixed_sensitivity
 
 # G, W1 and W_u; W2 = W_u/G. The first is Example 2.17 of S. Skogestad and I. Postlethwaite, Multivariable Feedback
 # Control, Wiley 2005
@@ -38,7 +38,7 @@ def test_against_slycot(against: Callable[..., object], problem: tuple[Block, Bl
 
 def test_chapter_two_synthesis(benchmark) -> None:  # type: ignore[no-untyped-def]
     """The synthesis alone; slycot does not come back on it."""
-    design = design_delay_free(read_model("implied"), 4.0, 1e-4)
+    design = design_delay_free(model_named("implied"), 4.0, 1e-4)
     assert design.hinf is not None
     W1, W2, decay_rate = (design.hinf[name] for name in ("W1", "W2", "decay_rate"))
     benchmark(mixed_sensitivity, design.blocks["G_A"], W1, W2, decay_rate)
@@ -46,7 +46,7 @@ def test_chapter_two_synthesis(benchmark) -> None:  # type: ignore[no-untyped-de
 
 def test_chapter_two_infimum(benchmark) -> None:  # type: ignore[no-untyped-def]
     """The decay rate driven down until the infimum of (2.8) is known to 1 %."""
-    design = design_delay_free(read_model("implied"), 4.0, 1e-4)
+    design = design_delay_free(model_named("implied"), 4.0, 1e-4)
     assert design.hinf is not None
     W1, W2, decay_rate = (design.hinf[name] for name in ("W1", "W2", "decay_rate"))
     benchmark(infimum, design.blocks["G_A"], W1, W2, decay_rate)
@@ -54,5 +54,5 @@ def test_chapter_two_infimum(benchmark) -> None:  # type: ignore[no-untyped-def]
 
 def test_chapter_two(benchmark) -> None:  # type: ignore[no-untyped-def]
     """The whole delay-free design."""
-    model = read_model("implied")
+    model = model_named("implied")
     benchmark(design_delay_free, model, 4.0, 1e-4)

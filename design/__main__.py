@@ -10,18 +10,20 @@ from pathlib import Path
 import click
 import numpy as np
 
-from design.anti_windup import anti_windup
-from design.audit import audit
-from design.audit_text import audit_text
-from design.block import from_polynomial
-from design.contract import Design, read_design
-from design.delay_free import design_delay_free
-from design.extended import METHODS, design_extended
-from design.judgement import SECTOR, facts
-from identification.digits import lower_end, upper_end
-from identification.files import CommandGroup, InputError, write_whole
-from identification.model import IdentifiedModel, read_model
-from identification.thesis import printed
+from data.thesis import model_named
+from design.anti_windup.compensator import anti_windup
+from design.anti_windup.judge import SECTOR, facts
+from design.auditing.as_text import audit_text
+from design.auditing.audit_design import audit
+from design.blocks.block import from_polynomial
+from design.chapter_2.design_delay_free import design_delay_free
+from design.chapters_3_4.design_extended import METHODS, design_extended
+from design.design_file import Design, read_design
+from identification.base.command_line import CommandGroup
+from identification.base.digits import lower_end, upper_end
+from identification.base.errors import InputError
+from identification.base.files import write_whole
+from identification.model.model_file import IdentifiedModel
 
 OUTPUT = click.option(
     "--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="design.json to write."
@@ -66,8 +68,7 @@ def main() -> None:
 @click.option(
     "--epsilon",
     type=float,
-    default=printed()["delay_free"]["epsilon"],
-    show_default=True,
+    required=True,
     help="Of the factor s^2 + epsilon of Lambda, rad^2/s^2.",
 )
 @corrected_options
@@ -82,7 +83,7 @@ def delay_free(
     output: Path,
 ) -> None:
     """Chapter 2: internal model, H-infinity stabiliser, anti-windup; the plant's dead time is ignored."""
-    design = design_delay_free(read_model(model), period, epsilon, recovery, sector, bandwidth)
+    design = design_delay_free(model_named(model), period, epsilon, recovery, sector, bandwidth)
     hinf = design.hinf or {}
     unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
     _finish(
@@ -136,7 +137,7 @@ def extended(
         raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected as many")
     pairs = list(zip(e, f, strict=True))
     design = design_extended(
-        read_model(model), omegas, a, pairs, method, inverse_epsilon, robust_level, recovery, sector, bandwidth
+        model_named(model), omegas, a, pairs, method, inverse_epsilon, robust_level, recovery, sector, bandwidth
     )
     poles = ", ".join(f"{pole:.4g}" for pole in design.blocks["T_so"].poles)
     _finish(design, model, output, f"Q designed by its {method}; closed loop with 1/s has the poles {poles}")

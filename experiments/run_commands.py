@@ -11,44 +11,29 @@ import click
 import numpy as np
 import pandas as pd
 
-from design.anti_windup import AntiWindup, printed_form
-from design.contract import Design, read_design
-from experiments.closed_loop import simulate
-from experiments.guarantee import guarantee
-from experiments.loops import design_loop
-from experiments.metrics import last_saturation
-from experiments.reference_file import read_reference
-from experiments.sampled import Drive, simulate_sampled
-from experiments.sampled_controller import METHODS
-from experiments.scenarios import Reference, SampledReference, thesis_reference
-from experiments.sector_promise import judge_run, steady_control, verdict
+from data.thesis import model_named
+from design.anti_windup.compensator import AntiWindup, printed_form
+from design.design_file import Design, read_design
+from experiments.drive.difference_equations import METHODS
+from experiments.drive.sampled_loop import Drive, simulate_sampled
+from experiments.engine.simulate import simulate
+from experiments.options import DESIGN, positive_limit, reference_of, reference_options
+from experiments.runs.design_loop import design_loop
+from experiments.runs.guarantee import guarantee
+from experiments.runs.metrics import last_saturation
+from experiments.runs.sector_promise import judge_run, steady_control, verdict
 from experiments.tables import write_tables
-from identification.files import InputError
-from identification.model import read_model
-from identification.plant import PlantModel
+from identification.base.errors import InputError
+from identification.model.plant import PlantModel
 
 MOST_ROWS = 1e7
-
-DESIGN = click.argument("design", type=click.Path(path_type=Path, dir_okay=False))
 
 _RUN = (
     DESIGN,
     click.option("--limit", type=float, required=True, help="Saturation limits +-LIMIT; inf for none."),
     click.option("--anti-windup", required=True, help="none, thesis, corrected, or another of DESIGN."),
     click.option("--until", type=float, required=True, help="Length of the run in seconds."),
-    click.option(
-        "--amplitude", type=float, multiple=True, help="Of the reference; once a frequency; else the thesis's."
-    ),
-    click.option("--phase", type=float, multiple=True, help="In radians; once a frequency; the thesis's unless given."),
-    click.option("--offset", type=float, help="Of the reference; the thesis's unless given."),
-    click.option(
-        "--slope", type=float, help="Of a ramp added to the reference, a second; --amplitude 0 leaves it alone."
-    ),
-    click.option(
-        "--reference",
-        type=click.Path(path_type=Path, dir_okay=False),
-        help="CSV of time_s and reference, joined by straight lines, instead of the sinusoids.",
-    ),
+    reference_options,
     click.option(
         "--plant", help="The true plant: a model.json, table or implied; the design's own model unless given."
     ),
@@ -93,7 +78,7 @@ def simulate_command(
     kind = _compensator(content, anti_windup, {"alpha": alpha, "beta": beta, "gamma": gamma})
     # the quotient of two decimals may come out a rounding below a whole number
     time_s = sample_time * np.arange(int(until / sample_time * (1 + 1e-12)) + 1)
-    limits, asked, true = (-limit, limit), _reference(content, **reference), _true_plant(plant)
+    limits, asked, true = (-limit, limit), reference_of(content, **reference), _true_plant(plant)
     loop = design_loop(content, asked, kind, true)
     run = simulate(loop, limits, time_s)
     table = pd.DataFrame(
@@ -148,7 +133,7 @@ def sampled_command(
     _require_few_rows(until * rate)
     content = read_design(design)
     kind = _compensator(content, anti_windup, {})
-    asked, true = _reference(content, **reference), _true_plant(plant)
+    asked, true = reference_of(content, **reference), _true_plant(plant)
     run = simulate_sampled(content, asked, kind, drive, until, true)
     beyond = run.time_s[np.abs(run.control) > limit]
     last = f", the last at {beyond[-1]:.6g} s" if len(beyond) else ""
@@ -168,13 +153,6 @@ def _first(promised: str, said: str) -> str:
     return f"{promised}; {said}" if promised else said
 
 
-def positive_limit(limit: float | None) -> float | None:
-    """Pass a limit on, if there is one; raises InputError when it is not positive."""
-    if limit is not None and not limit > 0:
-        raise InputError(f"--limit is {limit:g}; expected a positive number")
-    return limit
-
-
 def _require_few_rows(rows: float) -> None:
     if rows > MOST_ROWS:
         raise InputError(f"{rows:.3g} rows are asked for; expected at most {MOST_ROWS:.3g}")
@@ -189,33 +167,8 @@ def _compensator(design: Design, name: str, numbers: Mapping[str, float | None])
     return None if name == "none" else design.compensator(name)
 
 
-def _reference(
-    design: Design,
-    amplitude: tuple[float, ...],
-    phase: tuple[float, ...],
-    offset: float | None,
-    slope: float | None,
-    reference: Path | None,
-) -> Reference | SampledReference:
-    """The thesis's reference with what the options change in it, or the one of a file."""
-    if reference is not None:
-        options = {"amplitude": amplitude, "phase": phase, "offset": offset, "slope": slope}
-        for name, value in options.items():
-            if value not in ((), None):
-                raise InputError(f"--{name} belongs to a reference of sinusoids; found --reference {reference} too")
-        return read_reference(reference)
-    usual = thesis_reference(design.kind, design.reference_omegas)
-    return Reference(
-        amplitude or usual.amplitudes,
-        usual.omegas,
-        phase or usual.phases_rad,
-        usual.offset if offset is None else offset,
-        usual.slope if slope is None else slope,
-    )
-
-
 def _true_plant(plant: str | None) -> PlantModel | None:
-    return None if plant is None else read_model(plant).plant
+    return None if plant is None else model_named(plant).plant
 
 
 def _inputs(design: Path, plant: str | None, reference: Path | None) -> list[Path]:

@@ -9,12 +9,26 @@ from pathlib import Path
 
 import pandas as pd
 
-from identification.files import InputError, read_text, write_whole
+from identification.base.errors import InputError
+from identification.base.files import read_text, write_whole
 
 
 def write_tables(tables: Mapping[Path, pd.DataFrame], inputs: Iterable[Path] = ()) -> None:
     """Write tables as CSV, all of them or none, see :func:`csv_writer`."""
     write_whole({path: csv_writer(table) for path, table in tables.items()}, inputs)
+
+
+def write_into(folder: Path, tables: Mapping[str, pd.DataFrame]) -> None:
+    """Write tables as NAME.csv into an existing folder, all of them or none.
+
+    Raises
+    ------
+    InputError
+        There is no such folder, or see :func:`write_tables`.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder")
+    write_tables({folder / f"{name}.csv": table for name, table in tables.items()})
 
 
 def read_cells(path: Path, columns: Sequence[str]) -> pd.DataFrame:

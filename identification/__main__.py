@@ -9,17 +9,19 @@ import click
 import matplotlib.style
 from tqdm import tqdm
 
-from identification.discretised import alias_free
-from identification.files import CommandGroup, InputError, write_whole
-from identification.fit import fit_plant
-from identification.frequency_response import FrequencyResponse, input_files, read_sweeps
-from identification.model import IdentifiedModel
-from identification.plant import PlantModel
-from identification.plot import draw_fit
-from identification.report import bound_remarks, bound_text, check_lines, facts, standard_errors, table
-from identification.structure import Wanted
-from identification.subspace import SubspaceCheck, check_modes
-from identification.uncertainty import HIGHEST_ORDER, bound_residuals
+from identification.base.command_line import CommandGroup
+from identification.base.errors import InputError
+from identification.base.files import write_whole
+from identification.bound.bound_residuals import HIGHEST_ORDER, bound_residuals
+from identification.fitting.fit_plant import fit_plant
+from identification.fitting.subspace_check import SubspaceCheck, check_modes
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import PlantModel
+from identification.model.structure import Wanted
+from identification.output.fit_facts import bound_remarks, bound_text, check_lines, facts, standard_errors, table
+from identification.output.plots import draw_fit
+from identification.sweeps.read_sweeps import input_files, read_sweeps
+from identification.sweeps.response import FrequencyResponse, alias_free
 
 FIGURES = (".pdf", ".svg", ".png")
 

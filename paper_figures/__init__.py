@@ -1,6 +1,1 @@
-"""The figures of the thesis, one module ``fig_x_yy`` each.
-
-A figure module has ``TABLES``, the names of the tables it needs, ``draw(tables)``, which returns the figure and
-touches nothing else, and ``caption(tables)``, which returns its caption. ``tables`` maps the names to data frames.
-The command line reads the tables, draws and saves.
-"""
+"""Runs and designs -> figures, captions, the summary of a plant, and the thesis's figures and report."""

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import pytest
 
-from design.contract import Design
-from design.delay_free import design_delay_free
-from design.extended import design_extended
-from identification.model import IdentifiedModel, read_model
+from data.thesis import model_named
+from design.chapter_2.design_delay_free import design_delay_free
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from identification.model.model_file import IdentifiedModel
 
 
 @pytest.fixture(scope="session")
 def implied() -> IdentifiedModel:
     """The set behind the printed transfer functions."""
-    return read_model("implied")
+    return model_named("implied")
 
 
 @pytest.fixture(scope="session")
 def table() -> IdentifiedModel:
     """Table 2.1 as printed."""
-    return read_model("table")
+    return model_named("table")
 
 
 @pytest.fixture(scope="session")

@@ -23,7 +23,7 @@ from tqdm import tqdm
 
 from benchmarks.referee.cases import Case, Finding, case_of
 from benchmarks.referee.winding import Undecided
-from identification.files import InputError
+from identification.base.errors import InputError
 
 KINDS = ("margins", "roots", "conditions", "norms", "loop", "campaign", "sampled", "limits", "units")
 

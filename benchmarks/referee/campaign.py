@@ -8,10 +8,10 @@ from benchmarks.referee.cases import Case, Finding
 from benchmarks.referee.factors import Real, loop_of, of_bound, of_plant
 from benchmarks.referee.peaks import supremum
 from benchmarks.referee.winding import OnTheLine, around, characteristic
-from experiments.perturbed_stability import PerturbedLoop
-from experiments.uncertain_plants import PlantsWithin
-from identification.files import InputError
-from identification.plant import AdditiveBound, PlantModel
+from experiments.campaign.draw_plants import PlantsWithin
+from experiments.campaign.linear_stability import PerturbedLoop
+from identification.base.errors import InputError
+from identification.model.plant import AdditiveBound, PlantModel
 
 PLANTS = 4
 WITHIN = 1e-6  # |P_true - P|/|W_a| is said to be at most 1: what rounding and our own refinement leave

@@ -8,12 +8,12 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from design.contract import Design
-from design.delay_free import design_delay_free
-from design.extended import design_extended
-from experiments.scenarios import Reference
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.chapter_2.design_delay_free import design_delay_free
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from experiments.runs.references import Reference
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 DELAY_FREE = 4  # every fourth case is a delay-free design
 

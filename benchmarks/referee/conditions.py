@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.referee.cases import Case, Finding
 from benchmarks.referee.factors import Factors, of_block, of_plant
-from design.contract import Design
+from design.design_file import Design
 
 DIGITS = 60
 FOLLOWED = (

@@ -9,8 +9,8 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from design.contract import Design
-from identification.plant import AdditiveBound, PlantModel
+from design.design_file import Design
+from identification.model.plant import AdditiveBound, PlantModel
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -17,9 +17,9 @@ from scipy.optimize import linprog
 from benchmarks.referee.cases import Case, Finding
 from benchmarks.referee.factors import Factors, Real, of_plant
 from benchmarks.referee.realised import realised
-from experiments.physical_limits import RestLimit, periodic_limit
-from experiments.scenarios import Reference
-from identification.plant import PlantModel
+from experiments.physical_limits.least_peak_error import RestLimit, periodic_limit
+from experiments.runs.references import Reference
+from identification.model.plant import PlantModel
 
 HARMONICS = 16
 GRID = 12  # points for one harmonic in the programs

@@ -16,13 +16,13 @@ from benchmarks.referee.cases import Case, Finding
 from benchmarks.referee.factors import Factors, Loop, Real, loop_of, of_block
 from benchmarks.referee.realised import realised
 from benchmarks.referee.runge_kutta import run
-from design.anti_windup import AntiWindup
-from experiments.closed_loop import simulate
-from experiments.loops import design_loop
-from experiments.reference_file import read_reference
-from experiments.scenarios import Reference, SampledReference
-from identification.files import InputError
-from identification.plant import PlantModel
+from design.anti_windup.compensator import AntiWindup
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.reference_file import read_reference
+from experiments.runs.references import Reference, SampledReference
+from identification.base.errors import InputError
+from identification.model.plant import PlantModel
 
 MOST_STEPS = 25_000  # of the coarsest of the three runs
 FINENESS = 0.08  # of its step times the fastest eigenvalue

@@ -13,9 +13,9 @@ from benchmarks.referee.cases import Case, Finding
 from benchmarks.referee.factors import Loop, Real, loop_of, of_bound
 from benchmarks.referee.peaks import supremum
 from benchmarks.referee.winding import OnTheLine, around, characteristic, trail
-from design.robustness import Margins, delay_loop, margins_of
-from identification.files import InputError
-from identification.plant import PlantModel
+from design.stability.margins import Margins, delay_loop, margins_of
+from identification.base.errors import InputError
+from identification.model.plant import PlantModel
 
 GAINS = 1e3  # the largest factor that the project looks for
 EDGE = 1e-7  # relative: the bisections here end there, those of the project are finer

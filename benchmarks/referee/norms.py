@@ -13,7 +13,7 @@ from benchmarks.referee.factors import Factors, Loop, Real, of_block, of_bound
 from benchmarks.referee.nehari import optimum
 from benchmarks.referee.peaks import supremum
 from benchmarks.referee.winding import around, characteristic
-from design.contract import Design
+from design.design_file import Design
 
 PEAK = 1e-6  # relative: the project's peaks are refined to rounding, ours to better than this
 SECTOR = 5e-5  # of 1/k: half a unit of the last of four digits, as the audit prints it

@@ -10,9 +10,9 @@ import numpy as np
 from benchmarks.referee.cases import Case, Finding
 from benchmarks.referee.factors import Complex, Factors, Real, loop_of
 from benchmarks.referee.winding import OnTheLine, QuasiPolynomial, characteristic
-from design.quasi_polynomial import rightmost_roots
-from design.robustness import delay_loop
-from identification.plant import PlantModel
+from design.stability.characteristic_roots import rightmost_roots
+from design.stability.margins import delay_loop
+from identification.model.plant import PlantModel
 
 NAMED = 5
 DIGITS = 60

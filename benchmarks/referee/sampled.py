@@ -12,7 +12,7 @@ from benchmarks.referee.cases import Case, Finding
 from benchmarks.referee.factors import Factors, Real, loop_of, of_block
 from benchmarks.referee.loop import another
 from benchmarks.referee.realised import System, realised
-from experiments.sampled import Drive, simulate_sampled
+from experiments.drive.sampled_loop import Drive, simulate_sampled
 
 SAMPLES = 250
 SAME = 1e-8  # of the largest value so far: both are exact but for rounding, which unstable controllers amplify

@@ -10,16 +10,16 @@ import numpy as np
 
 from benchmarks.referee.cases import Case, Finding, case_of
 from benchmarks.referee.factors import Real
-from design.audit import covered_delay
-from design.contract import Design
-from design.quasi_polynomial import CharacteristicRoots, rightmost_roots
-from design.robustness import Margins, delay_loop, margins_of, tracking_floor
-from experiments.closed_loop import simulate
-from experiments.loops import design_loop
-from experiments.scenarios import Reference
-from identification.files import InputError
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.auditing.audit_design import covered_delay
+from design.design_file import Design
+from design.stability.characteristic_roots import CharacteristicRoots, rightmost_roots
+from design.stability.margins import Margins, delay_loop, margins_of, tracking_floor
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.references import Reference
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 SAME = 1e-6  # relative: every number is said to more digits than this, or to four, and searches end far below
 RUN = 1e-8  # of the largest value: 1e-11 of each step's, and what the loop makes of it

@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from experiments.claims import read_ledger, recompute
+from experiments.thesis.claims.ledger import read_ledger, recompute
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.printed_number import read_number
+from experiments.thesis.claims.printed_number import read_number
 
 Coefficient = str | int | float  # printed digits, or a number that was chosen and so is exact
 

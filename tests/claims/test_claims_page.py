@@ -6,9 +6,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from experiments.claims_coverage import read_record
-from experiments.claims_page import claims_page
-from identification.files import InputError
+from experiments.thesis.claims.coverage import read_record
+from experiments.thesis.claims.page import claims_page
+from identification.base.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from experiments.__main__ import main
-from experiments.claims_coverage import (
+from experiments.thesis.claims.coverage import (
     EXCEPTION_COLUMNS,
     coverage,
     coverage_record,
@@ -18,7 +18,7 @@ from experiments.claims_coverage import (
     read_exceptions,
     read_record,
 )
-from identification.files import InputError
+from identification.base.errors import InputError
 
 TEXT = r"""3.4 Results
 
@@ -130,7 +130,7 @@ def test_a_quote_holds_its_number(quote: str, printed: str, holds: bool):
 
 
 def test_the_kept_count_is_for_these_quotes_and_leaves_nothing(ledger: pd.DataFrame, exceptions: pd.DataFrame):
-    """Else: `python -m experiments coverage TEXT --record data/thesis/coverage.json`."""
+    """Else: `python -m experiments thesis coverage TEXT --record data/thesis/coverage.json`."""
     record = read_record()
     assert record["ledger_sha256"] == quotes_sha256(ledger, exceptions)
     assert "left" not in record["statuses"]
@@ -175,7 +175,7 @@ def test_bad_records_are_refused(content: str, part: str, tmp_path: Path):
 
 
 def test_command_lists_what_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("experiments.claims.read_ledger", lambda: QUOTES)
+    monkeypatch.setattr("experiments.thesis.claims.ledger.read_ledger", lambda: QUOTES)
     text, record = tmp_path / "text.md", tmp_path / "record.json"
     text.write_text(TEXT, encoding="utf-8")
     result = CliRunner().invoke(main, ["coverage", str(text), "--record", str(record)])
@@ -187,7 +187,8 @@ def test_command_lists_what_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     clean = TEXT.replace("peak 3.5", "peak").replace("3 modes", "modes")
     text.write_text(clean, encoding="utf-8")
     monkeypatch.setattr(
-        "experiments.claims.read_ledger", lambda: QUOTES.replace({"quote": {" peak 3.5": " peak"}}, regex=True)
+        "experiments.thesis.claims.ledger.read_ledger",
+        lambda: QUOTES.replace({"quote": {" peak 3.5": " peak"}}, regex=True),
     )
     assert CliRunner().invoke(main, ["coverage", str(text)]).exit_code == 0
 

@@ -6,25 +6,26 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from design.anti_windup import second_order
-from design.block import plant_block, plant_numerator
-from design.contract import Design
-from design.delay_free import design_delay_free
-from design.internal_model import internal_model
-from design.mixed_sensitivity import mixed_sensitivity
-from design.printed_optimum import beta_grid, optimal_gamma
-from experiments.claims_inputs import rounded_inputs
-from experiments.claims_parameters import table_2_1
-from experiments.claims_runs import least_peak_error
-from experiments.closed_loop import simulate
-from experiments.delay_free import delay_free_tables
-from experiments.extended import limit_for_last_saturation
-from experiments.loops import design_loop
-from experiments.metrics import last_saturation, over_last
-from experiments.pid import STEP, pid_tables
-from experiments.scenarios import Reference, thesis_reference
-from identification.model import IdentifiedModel, read_model
-from identification.thesis import printed
+from data.thesis import model_named, printed
+from design.anti_windup.compensator import second_order
+from design.anti_windup.thesis_compensator import beta_grid, optimal_gamma
+from design.blocks.block import plant_block, plant_numerator
+from design.chapter_2.design_delay_free import design_delay_free
+from design.chapter_2.internal_model import internal_model
+from design.design_file import Design
+from design.hinf.mixed_sensitivity import mixed_sensitivity
+from experiments.engine.simulate import simulate
+from experiments.physical_limits.integrator_bound import least_peak_error
+from experiments.runs.design_loop import design_loop
+from experiments.runs.metrics import last_saturation, over_last
+from experiments.runs.references import Reference
+from experiments.thesis.claims.checks.parameters import table_2_1
+from experiments.thesis.claims.inputs import rounded_inputs
+from experiments.thesis.printed_choices import thesis_reference
+from experiments.thesis.studies.chapter_2 import delay_free_tables
+from experiments.thesis.studies.chapter_4 import limit_for_last_saturation
+from experiments.thesis.studies.pid import STEP, pid_tables
+from identification.model.model_file import IdentifiedModel
 
 
 @pytest.fixture(scope="module")
@@ -61,12 +62,12 @@ def test_printed_theta2_implies_the_set_implied(ledger: pd.DataFrame, implied: I
 
 
 def test_zeta_n1_of_table_2_1_does_not_give_2_8():
-    zero = plant_numerator(read_model("table").plant).zeros[0]
+    zero = plant_numerator(model_named("table").plant).zeros[0]
     assert -2 * zero.real == pytest.approx(28.0, rel=1e-12)
 
 
 def test_omega_d1_of_table_2_1_does_not_give_7_952e4():
-    assert read_model("table").plant.pole_modes[0].omega ** 2 == 81225
+    assert model_named("table").plant.pole_modes[0].omega ** 2 == 81225
 
 
 # Rounding noise

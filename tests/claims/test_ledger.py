@@ -7,9 +7,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from experiments.claims import SLACK, read_ledger
-from experiments.claims_coverage import quotes_its_number
-from experiments.printed_number import read_number
+from experiments.thesis.claims.coverage import quotes_its_number
+from experiments.thesis.claims.ledger import SLACK, read_ledger
+from experiments.thesis.claims.printed_number import read_number
 
 ROOT = Path(__file__).resolve().parents[2]
 ROWS = read_ledger().to_dict("records")

@@ -7,14 +7,14 @@ import printed_functions as printed_text
 import pytest
 from printed_functions import FAST_PAIR, PrintedFunction
 
-from design.anti_windup import second_order
-from design.block import Block
-from design.contract import Design
-from design.internal_model import internal_model
-from design.smith_predictor import anti_windup_controller, augmented_plant
-from identification.model import IdentifiedModel, read_model
-from identification.plant import Mode, PlantModel
-from identification.thesis import printed
+from data.thesis import model_named, printed
+from design.anti_windup.compensator import second_order
+from design.blocks.block import Block
+from design.chapter_2.internal_model import internal_model
+from design.chapters_3_4.smith_predictor import anti_windup_controller, augmented_plant
+from design.design_file import Design
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import Mode, PlantModel
 
 GRID = 1j * np.union1d(np.geomspace(0.05, 5000, 500), [175.0, 280.0, 282.0, 930.0, 960.0])
 SLOW = 1j * np.geomspace(0.05, 30, 200)
@@ -50,7 +50,7 @@ def test_chapter_2(name: str, implied: IdentifiedModel):
 
 @pytest.mark.parametrize("name", ["G_A_2", "THETA1", "THETA2"])
 def test_chapter_2_does_not_follow_from_table_2_1(name: str):
-    block = delay_free_blocks(read_model("table").plant)[name]
+    block = delay_free_blocks(model_named("table").plant)[name]
     assert np.max(excess(getattr(printed_text, name), block, GRID)) > 0.01
 
 

@@ -8,14 +8,14 @@ import pytest
 from click.testing import CliRunner
 
 from experiments.__main__ import main
-from experiments.claims import COLUMNS, LEDGER, read_ledger, recompute
-from experiments.claims_inputs import Inputs, rounded_inputs
-from experiments.equations_page import EQUATIONS
-from experiments.printed_number import PrintedNumber, read_number
-from identification.files import InputError
+from experiments.thesis.claims.equations_page import EQUATIONS
+from experiments.thesis.claims.inputs import Inputs, rounded_inputs
+from experiments.thesis.claims.ledger import COLUMNS, LEDGER, read_ledger, recompute
+from experiments.thesis.claims.printed_number import PrintedNumber, read_number
+from identification.base.errors import InputError
 
-THETA2 = "experiments.claims_transfer_functions:theta2"
-GAMMA_OPT = "experiments.claims_parameters:gamma_opt"
+THETA2 = "experiments.thesis.claims.checks.transfer_functions:theta2"
+GAMMA_OPT = "experiments.thesis.claims.checks.parameters:gamma_opt"
 
 
 def one_row(printed: str, compute: str = THETA2, row_id: str = "theta2.gain") -> pd.DataFrame:
@@ -84,7 +84,7 @@ def test_without_compute_a_row_is_unchecked():
 
 
 def test_an_input_is_transcribed_and_not_reproduced():
-    transcribed = "experiments.claims_inputs:transcribed"
+    transcribed = "experiments.thesis.claims.inputs:transcribed"
     row = one_row("7.1", transcribed, "table_2_1.K").assign(kind="input")
     assert recompute(row).iloc[0]["verdict"] == "input"
     assert recompute(row.assign(printed="7.2")).iloc[0]["verdict"] == "differs"
@@ -103,13 +103,13 @@ def test_a_statement_gets_no_tolerance(monkeypatch: pytest.MonkeyPatch):
     def statement(inputs: Inputs) -> dict[str, float]:
         return {"statement.x": float(inputs["implied.gain"] > 7.105)}
 
-    monkeypatch.setattr("experiments.claims_parameters.gamma_opt", statement)
+    monkeypatch.setattr("experiments.thesis.claims.checks.parameters.gamma_opt", statement)
     assert recompute(one_row("true", GAMMA_OPT, "statement.x")).iloc[0]["verdict"] == "differs"
-    monkeypatch.setattr("experiments.claims_parameters.gamma_opt", lambda inputs: {"statement.x": 1.0})
+    monkeypatch.setattr("experiments.thesis.claims.checks.parameters.gamma_opt", lambda inputs: {"statement.x": 1.0})
     assert recompute(one_row("true", GAMMA_OPT, "statement.x")).iloc[0]["verdict"] == "agrees"
 
 
-@pytest.mark.parametrize("name", ["experiments.claims_parameters:nothing", "no_such_module:f", "theta2"])
+@pytest.mark.parametrize("name", ["experiments.thesis.claims.checks.parameters:nothing", "no_such_module:f", "theta2"])
 def test_unknown_function_is_refused(name: str):
     with pytest.raises(InputError, match="cannot be imported"):
         recompute(one_row("1", name))
@@ -181,7 +181,7 @@ def test_two_outputs_of_one_path_are_refused(small_ledger: Path):
 @pytest.fixture
 def small_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     table = pd.concat([one_row("19.659").assign(status="agrees"), one_row("7.1", "", "K").assign(status="unchecked")])
-    monkeypatch.setattr("experiments.claims.read_ledger", lambda: table.reset_index(drop=True))
+    monkeypatch.setattr("experiments.thesis.claims.ledger.read_ledger", lambda: table.reset_index(drop=True))
     return tmp_path
 
 
@@ -195,7 +195,9 @@ def test_command_writes_the_table_and_prints_counts(small_ledger: Path):
 
 
 def test_command_names_the_rows_whose_status_is_out_of_date(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("experiments.claims.read_ledger", lambda: one_row("19.659").assign(status="differs"))
+    monkeypatch.setattr(
+        "experiments.thesis.claims.ledger.read_ledger", lambda: one_row("19.659").assign(status="differs")
+    )
     result = CliRunner().invoke(main, ["claims", "--output", str(tmp_path)])
     assert result.exit_code == 0
     assert "theta2.gain: the ledger says differs, recomputed it agrees" in result.output

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from design.stable_interpolation import Conditions, by_poles, by_zeros, conditions, lagrange
-from identification.files import InputError
-from identification.thesis import printed
+from data.thesis import printed
+from design.chapters_3_4.interpolate_Q import Conditions, by_poles, by_zeros, conditions, lagrange
+from identification.base.errors import InputError
 
 DELAY_S = 8.1e-3
 

@@ -9,27 +9,27 @@ import pandas as pd
 import pytest
 from scipy.integrate import quad
 
-from design.block import Block, plant_block, plant_denominator
-from design.contract import Design
-from design.delay_loop import DelayLoop
-from design.extended import design_extended
-from design.quasi_polynomial import rightmost_roots, roots_right_of
-from design.robustness import delay_loop, margins_of
-from design.stable_interpolation import by_zeros, conditions
-from experiments import claims_runs
-from experiments.claims_inputs import Inputs, rounded_inputs
-from experiments.claims_interpolation import pade
-from experiments.claims_statements import internal_model_principle, plant_class, popov, smith_predictor
-from experiments.claims_weights import DESIGNS, long_run, over_weights
-from experiments.closed_loop import simulate
-from experiments.extended import extended_tables
-from experiments.loops import design_loop, pid_loop
-from experiments.metrics import over_last
-from experiments.pid import STEP, pid_tables
-from experiments.scenarios import PidBenchmark, thesis_reference
-from identification.frequency_response import read_sweeps
-from identification.model import IdentifiedModel, read_model
-from identification.thesis import DATA, printed
+from data.thesis import THESIS, model_named, printed
+from design.blocks.block import Block, plant_block, plant_denominator
+from design.chapters_3_4.design_extended import design_extended
+from design.chapters_3_4.interpolate_Q import by_zeros, conditions
+from design.design_file import Design
+from design.stability.characteristic_roots import rightmost_roots, roots_right_of
+from design.stability.delay_loop import DelayLoop
+from design.stability.margins import delay_loop, margins_of
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.metrics import over_last
+from experiments.thesis.claims.checks import saturated_runs
+from experiments.thesis.claims.checks.chapter_2_weights import DESIGNS, long_run, over_weights
+from experiments.thesis.claims.checks.interpolation_statements import pade
+from experiments.thesis.claims.checks.statements import internal_model_principle, plant_class, popov, smith_predictor
+from experiments.thesis.claims.inputs import Inputs, rounded_inputs
+from experiments.thesis.printed_choices import thesis_reference
+from experiments.thesis.studies.chapter_4 import extended_tables
+from experiments.thesis.studies.pid import STEP, PidBenchmark, pid_loop, pid_tables
+from identification.model.model_file import IdentifiedModel
+from identification.sweeps.read_sweeps import read_sweeps
 
 S = 1j * np.geomspace(1e-3, 1e4, 300)
 
@@ -157,7 +157,7 @@ def test_s2_plus_epsilon_holds_the_offset_that_R_leaves_out(delay_free_design: D
 
 
 def test_the_shipped_sweeps_say_that_they_are_synthetic():
-    tests = read_sweeps(sorted((DATA / "elevation").glob("*_frf.csv")))
+    tests = read_sweeps(sorted((THESIS.parent / "elevation").glob("*_frf.csv")))
     assert len(tests) == 6
     assert all(test.synthetic for test in tests)
 
@@ -200,7 +200,7 @@ def test_the_controller_output_exceeds_the_limits_by_little(weights: str):
 @pytest.mark.parametrize(("name", "peak", "at"), [("implied", 8.84, 175), ("table", 0.90, None)])
 def test_the_printed_bound_guarantees_nothing(name: str, peak: float, at: float | None):
     """For the set behind the printed transfer functions; for Table 2.1 as printed it does, with zeta_n1 = 0.08."""
-    model = read_model(name)
+    model = model_named(name)
     design = design_extended(model, [1.5], 4.0, [(2.0, 1.0)])
     found = margins_of(delay_loop(design, design.loop_plant), model.additive_bound).W_a_C_S
     assert found.value == pytest.approx(peak, abs=0.005)
@@ -352,7 +352,7 @@ def test_a_plant_of_another_kind_turns_its_statements(inputs: Inputs):
 def test_other_printed_numbers_turn_their_statements(inputs: Inputs, monkeypatch: pytest.MonkeyPatch):
     """gamma = -1 makes theta2 stable; with T_d ten times as long the Pade coefficients are still 2 and 12."""
     forgetting = {**printed(), "delay_free": printed()["delay_free"] | {"gamma": -1.0}}
-    monkeypatch.setattr("experiments.claims_statements.printed", lambda: forgetting)
+    monkeypatch.setattr("experiments.thesis.claims.checks.statements.printed", lambda: forgetting)
     assert popov(inputs)["statement.theta2_stable"] == 1
     longer = pade({**inputs, "implied.delay_s": 0.081})
     assert (longer["pade.s"], longer["pade.s2"]) == (pytest.approx(2), pytest.approx(12))
@@ -362,7 +362,7 @@ def test_another_design_turns_its_statements(inputs: Inputs, implied: Identified
     """A robust redesign keeps what is stable and equal, and is robust."""
     redesigned = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9)
     before = smith_predictor(inputs)
-    monkeypatch.setattr("experiments.claims_statements.chapter_4", lambda: redesigned)
+    monkeypatch.setattr("experiments.thesis.claims.checks.statements.chapter_4", lambda: redesigned)
     after = smith_predictor(inputs)
     assert {name for name in before if abs(before[name] - after[name]) > 0.5} == {"statement.robust"}
 
@@ -373,7 +373,7 @@ def test_a_stabiliser_that_does_not_stabilise_breaks_lemma_1(
 ):
     K = delay_free_design.blocks["K"].scaled(factor)
     other = replace(delay_free_design, blocks={**delay_free_design.blocks, "K": K})
-    monkeypatch.setattr("experiments.claims_statements.chapter_2", lambda: other)
+    monkeypatch.setattr("experiments.thesis.claims.checks.statements.chapter_2", lambda: other)
     assert internal_model_principle(inputs)["statement.lemma_1"] == 0
 
 
@@ -382,7 +382,7 @@ def test_a_lambda_without_the_sinusoid_breaks_lemma_1(
 ):
     assert internal_model_principle(inputs)["statement.lemma_1"] == 1
     other = replace(delay_free_design, blocks=delay_free_design.blocks | {"Lambda": Block(1.0, (-1 + 0j,) * 4)})
-    monkeypatch.setattr("experiments.claims_statements.chapter_2", lambda: other)
+    monkeypatch.setattr("experiments.thesis.claims.checks.statements.chapter_2", lambda: other)
     assert internal_model_principle(inputs)["statement.lemma_1"] == 0
 
 
@@ -393,8 +393,8 @@ def test_the_corrected_anti_windup_turns_the_statements_of_the_runs(
     renamed = replace(
         extended_design, anti_windup=extended_design.anti_windup | {"thesis": extended_design.anti_windup["corrected"]}
     )
-    monkeypatch.setattr(claims_runs, "chapter_4", lambda: renamed)
-    found = claims_runs.extended(inputs)
+    monkeypatch.setattr(saturated_runs, "chapter_4", lambda: renamed)
+    found = saturated_runs.extended(inputs)
     assert found["statement.error_converges"] == found["statement.minimises_error"] == 1
 
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from paper_figures import style
+from paper_figures.look import style
 
 Extents = Callable[[Figure, Callable[[Figure], Iterable[Text]]], list[tuple[str, Bbox]]]
 Saved = Callable[[Figure, str, str], dict[str, bytes]]

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 from matplotlib.axes import Axes
 
-from paper_figures import fig_a_01, fig_a_02, fig_a_03
-from paper_figures.style import LINES
+from paper_figures.look.style import LINES
+from paper_figures.thesis.figures import fig_a_01, fig_a_02, fig_a_03
 
 Tables = dict[str, pd.DataFrame]
 

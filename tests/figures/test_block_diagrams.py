@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from paper_figures.__main__ import figure_module
+from paper_figures.thesis.figure_registry import figure_module
 
 SIGNALS = {
     "fig_2_01": ["$r$", "$e$", "$u$", "$d$", "$y$", "$C(s)$", "$P(s)$"],

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from made_up_conditions import made_up_conditions
 
-from identification.files import InputError
-from paper_figures import fig_a_07
-from paper_figures.style import LINES
+from identification.base.errors import InputError
+from paper_figures.look.style import LINES
+from paper_figures.thesis.figures import fig_a_07
 
 Tables = dict[str, pd.DataFrame]
 

@@ -15,10 +15,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from identification.files import InputError
+from identification.base.errors import InputError
 from paper_figures import __main__ as command_line
-from paper_figures import captions, fig_2_12, fig_a_05, fig_a_06, panels, style
-from paper_figures.__main__ import figure_module
+from paper_figures.look import captions, panels, style
+from paper_figures.thesis.figure_registry import figure_module
+from paper_figures.thesis.figures import fig_2_12, fig_a_05, fig_a_06
 
 Tables = dict[str, pd.DataFrame]
 

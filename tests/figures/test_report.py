@@ -16,13 +16,13 @@ import pandas as pd
 import pytest
 from report_build import BREAKING_OUT, FIGURES, REFUSAL, ROOT, SWEEPS, Page, make_build, report
 
-from design.contract import read_design
-from identification.model import read_model
-from paper_figures.__main__ import figure_module, figure_names
-from paper_figures.report import file_size, report_html
-from paper_figures.report_content import Content, figure_label, first_sentence, report_content
-from paper_figures.report_inputs import LEDGER, Inputs, experiment_of, read_inputs
-from paper_figures.report_ledger import chapter_of
+from data.thesis import model_named
+from design.design_file import read_design
+from paper_figures.thesis.figure_registry import figure_module, figure_names
+from paper_figures.thesis.report.content import Content, figure_label, first_sentence, report_content
+from paper_figures.thesis.report.html import file_size, report_html
+from paper_figures.thesis.report.inputs import LEDGER, Inputs, experiment_of, read_inputs
+from paper_figures.thesis.report.ledger import chapter_of
 
 
 @pytest.fixture(scope="module")
@@ -212,7 +212,7 @@ def test_the_fit_has_its_intervals_and_the_design_its_audit(page: Page, content:
 
 @pytest.mark.parametrize("model", ["implied", "table"])
 def test_a_printed_set_is_said_not_to_be_fitted(inputs: Inputs, model: str) -> None:
-    given = replace(inputs, model_name=model, model=read_model(model), designs={})
+    given = replace(inputs, model_name=model, model=model_named(model), designs={})
     page = Page(report_html(report_content(given)))
     assert "Not fitted here" in page.text
     assert "95 % interval" not in page.text

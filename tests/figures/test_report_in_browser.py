@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from report_build import BREAKING_OUT, FIGURES, SWEEPS, make_build, report
 
-from paper_figures.report_ledger import chapter_of
+from paper_figures.thesis.report.ledger import chapter_of
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 PHONE = {"width": 390, "height": 844}

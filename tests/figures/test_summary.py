@@ -13,19 +13,21 @@ import pytest
 from click.testing import CliRunner, Result
 from matplotlib.figure import Figure
 
-from design.anti_windup import second_order
-from design.block import Block
-from design.contract import Design
-from identification.files import InputError
-from identification.frequency_response import FrequencyResponse
-from identification.model import IdentifiedModel, read_model
-from identification.plant import AdditiveBound, Mode, PlantModel
-from identification.structure import Structure
-from paper_figures import style, summary_page
+from data.thesis import model_named
+from design.anti_windup.compensator import second_order
+from design.blocks.block import Block
+from design.design_file import Design
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.structure import Structure
+from identification.sweeps.response import FrequencyResponse
 from paper_figures.__main__ import main
-from paper_figures.summary import Summary, summarise
-from paper_figures.summary_of_designs import sentences
-from paper_figures.summary_of_fit import parameter_table
+from paper_figures.look import style
+from paper_figures.summary import page
+from paper_figures.summary.of_designs import sentences
+from paper_figures.summary.of_fit import parameter_table
+from paper_figures.summary.words import Summary, summarise
 
 NO_INTEGRATOR = "the plant has 0 integrators; the design expects exactly one, Eq. (2.20)"
 SIMPLE = AdditiveBound.printed_form(0.3, 40.0, 60.0, 0.2)
@@ -161,7 +163,7 @@ def page_of(
         if refused
         else summarise(model, tests, DESIGNS, outcomes())
     )
-    return said, summary_page.draw(said, model, tests)
+    return said, page.draw(said, model, tests)
 
 
 PAGES = {
@@ -317,18 +319,18 @@ def test_model_of_other_tests_or_of_none_is_refused():
     with pytest.raises(InputError, match=r"fitted to day_0.csv, day_1.csv; expected these sweeps"):
         summarise(model_of(plant, tests), tests[:1], {}, {})
     with pytest.raises(InputError, match="says nothing of tests; expected a model that was fitted to sweeps"):
-        summarise(read_model("implied"), tests, {}, {})
+        summarise(model_named("implied"), tests, {}, {})
 
 
 def test_lines_are_broken_at_words_and_symbols_are_set():
     with style.styled():
         words = "one zeta_two.csv omega " * 20 + "$ (s/7)^2 +-3 omega."
-        broken = summary_page._broken(words, 3.0, 8.0)
+        broken = page._broken(words, 3.0, 8.0)
         assert " ".join(broken) == " ".join(words.split())
         assert len(broken) > 3
-        assert all(summary_page._width(line, 8.0) <= 3.0 for line in broken)
-        assert summary_page._broken("w" * 200, 1.0, 8.0) == ["w" * 200]
-    assert summary_page._typeset("omega.csv omega, $5 +-3 omega.") == r"omega.csv $\omega$, \$5 $\pm$3 $\omega$."
+        assert all(page._width(line, 8.0) <= 3.0 for line in broken)
+        assert page._broken("w" * 200, 1.0, 8.0) == ["w" * 200]
+    assert page._typeset("omega.csv omega, $5 +-3 omega.") == r"omega.csv $\omega$, \$5 $\pm$3 $\omega$."
 
 
 @pytest.fixture

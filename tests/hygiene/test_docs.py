@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.claims import read_ledger
+from experiments.thesis.claims.ledger import read_ledger
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -16,8 +16,8 @@ import pytest
 from click.testing import CliRunner
 
 from experiments.__main__ import main
-from experiments.equations_page import EQUATIONS, equations_page, named_object, read_equations
-from identification.files import InputError
+from experiments.thesis.claims.equations_page import EQUATIONS, equations_page, named_object, read_equations
+from identification.base.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -49,7 +49,7 @@ def labels_in(text: str) -> set[str]:
 def said_of(name: str) -> str:
     """Docstring and comments of a function, class or property; of a figure its module's, which is the figure."""
     thing = named_object(name)
-    if name.startswith("paper_figures.fig_"):
+    if name.startswith("paper_figures.thesis.figures.fig_"):
         return inspect.getdoc(inspect.getmodule(inspect.unwrap(thing))) or ""
     source = inspect.getsource(thing.fget if isinstance(thing, property) else thing)
     tokens = tokenize.generate_tokens(io.StringIO(inspect.cleandoc("\n" + source)).readline)
@@ -93,7 +93,7 @@ def faults(table: pd.DataFrame) -> Iterator[str]:
 
 
 def test_the_page_in_the_repository_is_current(table: pd.DataFrame) -> None:
-    """After a change of equations.csv: `python -m experiments equations --page docs/equations.md`."""
+    """After a change of equations.csv: `python -m experiments thesis equations --page docs/equations.md`."""
     assert (ROOT / "docs" / "equations.md").read_text(encoding="utf-8") == equations_page(table)
 
 
@@ -122,14 +122,18 @@ def changed(table: pd.DataFrame, row: str, /, **cells: str) -> pd.DataFrame:
         ({"function": ""}, "(2.18) has no function or no test"),
         ({"test": ""}, "(2.18) has no function or no test"),
         (
-            {"function": "design.anti_windup:AntiWindup.theta3"},
-            "(2.18): there is no design.anti_windup:AntiWindup.theta3",
+            {"function": "design.anti_windup.compensator:AntiWindup.theta3"},
+            "(2.18): there is no design.anti_windup.compensator:AntiWindup.theta3",
         ),
         ({"function": "design.antiwindup:second_order"}, "(2.18): there is no design.antiwindup:second_order"),
-        ({"function": "design.anti_windup:second_order"}, "(2.18): design.anti_windup:second_order does not name it"),
         (
-            {"function": "design.anti_windup:_require_strictly_proper_and_stable"},
-            "(2.18): design.anti_windup:_require_strictly_proper_and_stable is not public or has no docstring",
+            {"function": "design.anti_windup.compensator:second_order"},
+            "(2.18): design.anti_windup.compensator:second_order does not name it",
+        ),
+        (
+            {"function": "design.anti_windup.compensator:_require_strictly_proper_and_stable"},
+            "(2.18): design.anti_windup.compensator:_require_strictly_proper_and_stable is not public or has no "
+            "docstring",
         ),
         ({"test": "tests/unit/test_equations.py::test_x"}, "(2.18): there is no tests/unit/test_equations.py::test_x"),
         ({"test": "tests/unit/test_equation.py::test_x"}, "(2.18): there is no tests/unit/test_equation.py::test_x"),
@@ -168,10 +172,10 @@ def test_what_a_text_names(text: str, labels: set[str]) -> None:
 
 
 def test_only_docstring_and_comments_say_a_label() -> None:
-    said = said_of("design.block:require_thesis_class")
+    said = said_of("design.blocks.block:require_thesis_class")
     assert "(2.20)" in labels_in(said)
     assert "(3.16)" not in labels_in(said)  # it stands in a message there
-    said = said_of("paper_figures.fig_2_12:draw")
+    said = said_of("paper_figures.thesis.figures.fig_2_12:draw")
     assert labels_in(said) == {"Fig. 2.12"}
 
 
@@ -181,8 +185,12 @@ def test_only_docstring_and_comments_say_a_label() -> None:
         ("label,title", "labels,title", "the columns are labels, title"),
         ("(2.18),", "2.18,", "label of row 31, 2.18, is '2.18'; expected (2.18), Lemma 2 or Fig. 2.6"),
         ("(2.18),", "(2.17),", "(2.17) stands twice"),
-        ("design.anti_windup:second_order", "second_order", "function of row 39, (2.23), is 'second_order'"),
-        ("design.anti_windup:second_order", "", "function of row 39, (2.23), is ''"),
+        (
+            "design.anti_windup.compensator:second_order",
+            "second_order",
+            "function of row 39, (2.23), is 'second_order'",
+        ),
+        ("design.anti_windup.compensator:second_order", "", "function of row 39, (2.23), is ''"),
         ("tests/unit/test_plant.py::test_the_printed_form_of_the_bound", "", "test of row 37, (2.22), is ''"),
     ],
 )

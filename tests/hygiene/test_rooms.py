@@ -87,7 +87,7 @@ def test_makefile_knows_every_figures_tables() -> None:
     for name, table in re.findall(r"\$\(call drawing,(\w+)\): \$\(RESULTS\)/(\w+)\.csv", makefile):
         feeds[name].add(table)
     sys.path.insert(0, str(ROOT))
-    from paper_figures.__main__ import figure_module, figure_names
+    from paper_figures.thesis.figure_registry import figure_module, figure_names
 
     diagrams = set(re.search(r"DIAGRAMS := (.*)", makefile)[1].split())  # type: ignore[index]
     assert len(figure_names()) == 27

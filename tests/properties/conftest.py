@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from other_units import small_delay_free, small_extended
 
-from design.contract import Design
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.design_file import Design
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 
 @pytest.fixture(scope="session")

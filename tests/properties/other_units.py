@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from design.block import Block
-from design.contract import Design
-from design.delay_free import design_delay_free
-from design.extended import design_extended
-from experiments.scenarios import Reference, SampledReference
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.blocks.block import Block
+from design.chapter_2.design_delay_free import design_delay_free
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from experiments.runs.references import Reference, SampledReference
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.fit import fit_plant
-from identification.frequency_response import FrequencyResponse
-from identification.plant import Mode, PlantModel
-from identification.structure import Structure
+from identification.fitting.fit_plant import fit_plant
+from identification.model.plant import Mode, PlantModel
+from identification.model.structure import Structure
+from identification.sweeps.response import FrequencyResponse
 
 BANDS_HZ = ((0.1, 5.0), (10.0, 200.0), (100.0, 5000.0))
 

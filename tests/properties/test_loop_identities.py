@@ -9,18 +9,19 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from design.anti_windup import AntiWindup, second_order
-from design.audit import audit
-from design.contract import Design
-from design.extended import design_extended
-from experiments.closed_loop import simulate
-from experiments.loops import design_loop
-from experiments.metrics import last_saturation
-from experiments.pade import with_pade
-from experiments.scenarios import Reference, sinusoid, thesis_reference
-from identification.files import InputError
-from identification.model import IdentifiedModel
-from identification.plant import PlantModel
+from design.anti_windup.compensator import AntiWindup, second_order
+from design.auditing.audit_design import audit
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from experiments.engine.pade import with_pade
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.metrics import last_saturation
+from experiments.runs.references import Reference, sinusoid
+from experiments.thesis.printed_choices import thesis_reference
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import PlantModel
 
 LIMITS = st.floats(8.0, 40.0)
 FREE = (-np.inf, np.inf)

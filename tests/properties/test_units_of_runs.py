@@ -17,17 +17,17 @@ from hypothesis import strategies as st
 from other_units import Units, same
 
 from design.__main__ import main as design_main
-from design.block import Block
-from design.contract import Design, read_design
+from design.blocks.block import Block
+from design.design_file import Design, read_design
 from experiments.__main__ import main as experiments_main
-from experiments.closed_loop import DivergenceError, Run, simulate
-from experiments.guarantee import guarantee, sector_text
-from experiments.loops import design_loop
-from experiments.sampled import Drive, SampledRun, simulate_sampled
-from experiments.saturated_loop import SaturatedLoop
-from experiments.scenarios import Reference, SampledReference
-from experiments.sector_promise import Verdict, judge_run
-from identification.plant import Mode, PlantModel
+from experiments.drive.sampled_loop import Drive, SampledRun, simulate_sampled
+from experiments.engine.saturated_loop import SaturatedLoop
+from experiments.engine.simulate import DivergenceError, Run, simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.guarantee import guarantee, sector_text
+from experiments.runs.references import Reference, SampledReference
+from experiments.runs.sector_promise import Verdict, judge_run
+from identification.model.plant import Mode, PlantModel
 
 SIGNS = st.sampled_from([-1.0, 1.0])
 POWERS = st.builds(

@@ -15,26 +15,27 @@ import pytest
 from other_units import Units, same, small_delay_free, small_extended
 from scipy.signal import chirp, cont2discrete, dlsim
 
-from design.anti_windup import AntiWindup
-from design.contract import Design
-from experiments import f_gamma, interpolation_regions, trade_off
-from experiments.additive_error import additive_error_tables
-from experiments.campaign import Campaign, code_sha256, run_chunk
-from experiments.delay_free import delay_free_tables
-from experiments.extended import desaturation, extended_tables, usual_limit
-from experiments.f_gamma import f_gamma_tables
-from experiments.interpolation_regions import interpolation_tables
-from experiments.robustness import robustness_tables
-from experiments.sampled_rates import sampled_rates_tables
-from experiments.trade_off import trade_off_tables
-from experiments.uncertain_plants import PlantsWithin
-from identification.fit import fit_plant
-from identification.frequency_response import FrequencyResponse, read_sweeps
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
-from identification.report import table as fit_table
-from identification.structure import Wanted
-from identification.uncertainty import bound_residuals
+from design.anti_windup.compensator import AntiWindup
+from design.design_file import Design
+from experiments.campaign.draw_plants import PlantsWithin
+from experiments.campaign.run_plants import Campaign, code_sha256, run_chunk
+from experiments.thesis.studies import f_gamma, interpolation, trade_off
+from experiments.thesis.studies.additive_error import additive_error_tables
+from experiments.thesis.studies.chapter_2 import delay_free_tables
+from experiments.thesis.studies.chapter_4 import desaturation, extended_tables, usual_limit
+from experiments.thesis.studies.f_gamma import f_gamma_tables
+from experiments.thesis.studies.interpolation import interpolation_tables
+from experiments.thesis.studies.robustness import robustness_tables
+from experiments.thesis.studies.sampled_rates import sampled_rates_tables
+from experiments.thesis.studies.trade_off import trade_off_tables
+from identification.bound.bound_residuals import bound_residuals
+from identification.fitting.fit_plant import fit_plant
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.structure import Wanted
+from identification.output.fit_facts import table as fit_table
+from identification.sweeps.read_sweeps import read_sweeps
+from identification.sweeps.response import FrequencyResponse
 
 Tables = Mapping[str, pd.DataFrame]
 LIMIT = 40.0
@@ -160,8 +161,8 @@ def test_where_the_designs_of_q_work(
     small_designs: dict[str, Design], units: Units, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Zeros and poles; the thesis's Lagrange denominator (s + 1)^(n - 1) has its root at 1 rad/s in any unit."""
-    monkeypatch.setattr(interpolation_regions, "FREQUENCIES", 12)
-    monkeypatch.setattr(interpolation_regions, "_poles_are_stable", lambda omega_delay, a_delay: 0)
+    monkeypatch.setattr(interpolation, "FREQUENCIES", 12)
+    monkeypatch.setattr(interpolation, "_poles_are_stable", lambda omega_delay, a_delay: 0)
     own = small_designs["extended"]
     found, expected = (interpolation_tables(each.design(own)) for each in (units, Units()))
     for tables in (found, expected):

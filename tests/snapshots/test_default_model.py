@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from strict import Strict
 
-from identification.fit import fit_plant
-from identification.frequency_response import read_sweeps
-from identification.thesis import DATA
+from data.thesis import THESIS
+from identification.fitting.fit_plant import fit_plant
+from identification.sweeps.read_sweeps import read_sweeps
 
 
 def test_default_model(strict_snapshot: Strict) -> None:
-    tests = read_sweeps(sorted((DATA / "elevation").glob("*_frf.csv")))
+    tests = read_sweeps(sorted((THESIS.parent / "elevation").glob("*_frf.csv")))
     result = fit_plant(tests)
     plant = result.plant
     modes = [*plant.zero_modes, *plant.pole_modes]

@@ -21,23 +21,22 @@ from matplotlib.figure import Figure
 from pytest_regressions.file_regression import FileRegressionFixture
 from strict import Strict, collected, flagged, read_snapshot, table_of
 
-from design.contract import Design, read_design
-from design.extended import design_extended
+from data.thesis import THESIS, model_named
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design, read_design
 from experiments.__main__ import main
-from experiments.additive_error import additive_error_tables
-from experiments.campaign_tables import campaign_tables
-from experiments.delay_free import delay_free_tables
-from experiments.extended import extended_tables
-from experiments.f_gamma import f_gamma_tables
-from experiments.interpolation_regions import interpolation_tables
-from experiments.pid import pid_tables
-from experiments.robustness import robustness_tables
-from experiments.sampled_rates import sampled_rates_tables
-from experiments.trade_off import trade_off_tables
-from identification.frequency_response import read_sweeps
-from identification.model import read_model
-from identification.thesis import DATA
-from paper_figures.__main__ import figure_module, figure_names
+from experiments.campaign.distributions import campaign_tables
+from experiments.thesis.studies.additive_error import additive_error_tables
+from experiments.thesis.studies.chapter_2 import delay_free_tables
+from experiments.thesis.studies.chapter_4 import extended_tables
+from experiments.thesis.studies.f_gamma import f_gamma_tables
+from experiments.thesis.studies.interpolation import interpolation_tables
+from experiments.thesis.studies.pid import pid_tables
+from experiments.thesis.studies.robustness import robustness_tables
+from experiments.thesis.studies.sampled_rates import sampled_rates_tables
+from experiments.thesis.studies.trade_off import trade_off_tables
+from identification.sweeps.read_sweeps import read_sweeps
+from paper_figures.thesis.figure_registry import figure_module, figure_names
 
 LOOPS = ("pid", "delay_free", "extended", "sampled")
 EXPERIMENTS = (*LOOPS, "additive_error", "f_gamma", "trade_off", "interpolation", "robustness", "campaign")
@@ -77,7 +76,7 @@ NOT_KEPT = set(made_up())
 
 @cache
 def sweeps() -> tuple[object, ...]:
-    return tuple(read_sweeps(sorted((DATA / "elevation").glob("*_frf.csv"))))
+    return tuple(read_sweeps(sorted((THESIS.parent / "elevation").glob("*_frf.csv"))))
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +108,7 @@ def stored_design(delay_free_design: Design, tmp_path_factory: pytest.TempPathFa
 
 @pytest.fixture(scope="module")
 def tables(extended_design: Design, stored_design: Design, campaign: Path) -> dict[str, pd.DataFrame]:
-    implied = read_model("implied")
+    implied = model_named("implied")
     chosen = extended_design.parameters
     robust = design_extended(implied, extended_design.reference_omegas, chosen["a"], chosen["pairs"], robust_level=0.9)
     return (

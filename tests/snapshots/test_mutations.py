@@ -23,7 +23,7 @@ from pytest_regressions.common import check_text_files
 from strict import Stored
 from test_figure_data import STORED, draw_stored
 
-from paper_figures.__main__ import figure_names
+from paper_figures.thesis.figure_registry import figure_names
 
 LARGER = 1 + SMALL
 FILES = snapshot_files()

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.linalg import matrix_balance, schur
 from scipy.optimize import brentq
 
-from experiments.saturated_loop import SaturatedLoop
+from experiments.engine.saturated_loop import SaturatedLoop
 
 Array = NDArray[Any]
 
@@ -230,7 +230,7 @@ def collocated_run(
     Parameters
     ----------
     loop, limits, time_s
-        As of :func:`experiments.closed_loop.simulate`.
+        As of :func:`experiments.engine.simulate.simulate`.
     nodes, reach, generations
         See the constants of this module; more nodes, a shorter reach and more generations are more accurate.
 

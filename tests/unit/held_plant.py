@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm
 from scipy.signal import tf2ss
 
-from identification.discretised import hold, pulse_response
-from identification.plant import Mode, PlantModel
+from identification.model.plant import Mode, PlantModel
+from identification.model.pulse_response import hold, pulse_response
 
 Real = NDArray[np.float64]
 PLANTS = {

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from design.block import Block, geometric_scale
+from design.blocks.block import Block, geometric_scale
 
 
 def nehari_optimum(G: Block, W1: Block, W2: Block, a: float, points: int) -> float:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from experiments.saturated_loop import SaturatedLoop
+from experiments.engine.saturated_loop import SaturatedLoop
 
 
 def reference_run(

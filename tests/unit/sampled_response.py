@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.sampled_controller import SampledBlock
+from experiments.drive.difference_equations import SampledBlock
 
 
 def response(block: SampledBlock, z: np.ndarray) -> np.ndarray:

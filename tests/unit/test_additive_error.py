@@ -10,11 +10,11 @@ import pytest
 from click.testing import CliRunner
 
 from experiments.__main__ import main
-from experiments.additive_error import additive_error_tables
-from identification.discretised import aliases
-from identification.frequency_response import FrequencyResponse, Record
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from experiments.thesis.studies.additive_error import additive_error_tables
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.pulse_response import aliases
+from identification.sweeps.response import FrequencyResponse, Record
 
 PLANT = PlantModel(2.0, (Mode(60.0, 0.05),), (Mode(90.0, 0.04),), 0.004)
 MODEL = IdentifiedModel(PLANT, AdditiveBound.printed_form(0.3, 40.0, 60.0, 0.2), None, {})

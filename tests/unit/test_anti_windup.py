@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.anti_windup import AntiWindup, anti_windup, from_one_plus, second_order, uncertainty_cost
-from design.block import Block, bound_block, plant_block
-from design.corrected import Corrected, corrected
-from design.judgement import compensators, judge, lasting_offset, robust_sector
-from design.popov import popov_sector, robust_popov_sector
-from design.printed_optimum import least_f, optimal_gamma, thesis_choice
-from identification.files import InputError
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.anti_windup.compensator import AntiWindup, anti_windup, from_one_plus, second_order, uncertainty_cost
+from design.anti_windup.corrected_compensator import Corrected, corrected
+from design.anti_windup.judge import compensators, judge, lasting_offset, robust_sector
+from design.anti_windup.popov import popov_sector, robust_popov_sector
+from design.anti_windup.thesis_compensator import least_f, optimal_gamma, thesis_choice
+from design.blocks.block import Block, bound_block, plant_block
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 S = 1j * np.geomspace(1e-2, 1e4, 300) + 0.05
 positive = st.floats(1e-3, 1e3)

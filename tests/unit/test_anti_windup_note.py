@@ -9,18 +9,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.anti_windup import from_one_plus, second_order
-from design.block import Block, plant_block
-from design.contract import Design
-from design.corrected import corrected
-from design.extended import design_extended
-from design.judgement import judge, lasting_offset
-from design.popov import popov_sector
-from experiments.closed_loop import simulate
-from experiments.loops import design_loop
-from experiments.scenarios import sinusoid, thesis_reference
-from identification.model import IdentifiedModel
-from identification.plant import Mode, PlantModel
+from design.anti_windup.compensator import from_one_plus, second_order
+from design.anti_windup.corrected_compensator import corrected
+from design.anti_windup.judge import judge, lasting_offset
+from design.anti_windup.popov import popov_sector
+from design.blocks.block import Block, plant_block
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.references import sinusoid
+from experiments.thesis.printed_choices import thesis_reference
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import Mode, PlantModel
 
 S = 1j * np.geomspace(1e-2, 1e3, 100) + 0.03
 rates = st.floats(0.1, 50.0)

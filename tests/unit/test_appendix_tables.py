@@ -7,15 +7,15 @@ import dataclasses
 import numpy as np
 import pytest
 
-from design.contract import Design
-from design.extended import design_extended
-from design.judgement import judge
-from experiments import trade_off
-from experiments.interpolation_regions import SENSITIVITY, interpolation_tables
-from experiments.robustness import robustness_tables
-from identification.files import InputError
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.anti_windup.judge import judge
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from experiments.thesis.studies import trade_off
+from experiments.thesis.studies.interpolation import SENSITIVITY, interpolation_tables
+from experiments.thesis.studies.robustness import robustness_tables
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 OTHER = PlantModel(-0.4, (Mode(20.0, 0.03),), (Mode(32.0, 0.02),), 0.06)
 

@@ -13,13 +13,13 @@ import pytest
 from click.testing import CliRunner
 
 from design.__main__ import main
-from design.audit import audit
-from design.contract import Design, read_design
-from design.delay_free import design_delay_free
-from design.extended import design_extended
-from design.mixed_sensitivity import Synthesis
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.auditing.audit_design import audit
+from design.chapter_2.design_delay_free import design_delay_free
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design, read_design
+from design.hinf.mixed_sensitivity import Synthesis
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 
 @pytest.fixture

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from design.contract import Design
-from experiments.batch import IN_FLIGHT, simulate_many
-from experiments.closed_loop import DivergenceError, simulate
-from experiments.loops import design_loop
-from experiments.scenarios import SampledReference, sinusoid
-from identification.files import InputError
-from identification.plant import PlantModel
+from design.design_file import Design
+from experiments.engine.simulate import DivergenceError, simulate
+from experiments.runs.batch import IN_FLIGHT, simulate_many
+from experiments.runs.design_loop import design_loop
+from experiments.runs.references import SampledReference, sinusoid
+from identification.base.errors import InputError
+from identification.model.plant import PlantModel
 
 REFERENCES = [sinusoid(50.0, 1.5, 0.2, 0.0), SampledReference(np.array([0.0, 0.4]), np.array([0.0, 20.0]))]
 TIMES = np.linspace(0.0, 0.6, 61)

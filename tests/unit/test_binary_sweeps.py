@@ -15,8 +15,9 @@ from scipy.io import savemat
 from sweep_columns import COLUMNS as SHARED
 from sweep_columns import FREQUENCY_HZ, RESPONSE
 
-from identification.files import InputError
-from identification.frequency_response import FrequencyResponse, read_sweeps
+from identification.base.errors import InputError
+from identification.sweeps.read_sweeps import read_sweeps
+from identification.sweeps.response import FrequencyResponse
 
 COHERENCE = 1 - FREQUENCY_HZ / 100
 TIME_S = np.arange(200) / 128

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.block import (
+from design.blocks.block import (
     Block,
     bound_block,
     from_polynomial,
@@ -17,10 +17,10 @@ from design.block import (
     plant_numerator,
     polynomial,
 )
-from design.realization import StateSpace, realize
-from identification.files import InputError
-from identification.model import IdentifiedModel
-from identification.plant import Mode
+from design.blocks.state_space import StateSpace, realize
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import Mode
 
 S = 1j * np.geomspace(1e-2, 1e4, 400) + 0.1
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from identification.bound_fit import resonances
-from identification.bound_shape import Shape
-from identification.chebyshev import least_largest_excess
-from identification.envelope import envelope_of
-from identification.level_certificate import excludes
-from identification.plant import AdditiveBound, Mode
+from identification.bound.envelope import envelope_of
+from identification.bound.least_excess import least_largest_excess
+from identification.bound.level_certificate import excludes
+from identification.bound.shape import Shape
+from identification.bound.tightest_bound import resonances
+from identification.model.plant import AdditiveBound, Mode
 
 Real = NDArray[np.float64]
 

@@ -18,22 +18,22 @@ import pytest
 from click.testing import CliRunner, Result
 from pyarrow import parquet
 
-from design.contract import Design
-from design.extended import design_extended
-from design.quasi_polynomial import roots_right_of
-from design.robustness import delay_loop
-from experiments import campaign_file
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from design.stability.characteristic_roots import roots_right_of
+from design.stability.margins import delay_loop
 from experiments.__main__ import main
-from experiments.campaign import Campaign, code_sha256, run_chunk
-from experiments.closed_loop import simulate
-from experiments.guarantee import guarantee_within
-from experiments.loops import design_loop
-from experiments.perturbed_stability import PerturbedLoop
-from experiments.scenarios import thesis_reference
-from experiments.uncertain_plants import PlantsWithin
-from identification.files import InputError
-from identification.model import IdentifiedModel
-from identification.plant import Mode, PlantModel
+from experiments.campaign import checkpoint
+from experiments.campaign.draw_plants import PlantsWithin
+from experiments.campaign.linear_stability import PerturbedLoop
+from experiments.campaign.run_plants import Campaign, code_sha256, run_chunk
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.guarantee import guarantee_within
+from experiments.thesis.printed_choices import thesis_reference
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import Mode, PlantModel
 
 ROOT = Path(__file__).resolve().parents[2]
 PLANTS, LIMIT = 24, 12.0
@@ -141,7 +141,7 @@ def test_other_code_than_the_commands_is_refused(campaign: Campaign) -> None:
 
 
 def test_a_run_that_diverges_is_a_result(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
-    from experiments import campaign as module
+    from experiments.campaign import run_plants as module
 
     def diverges(*_: object) -> None:
         raise module.DivergenceError(1.0)
@@ -187,7 +187,7 @@ def test_a_chapter_2_design_runs_too(delay_free_design: Design) -> None:
 
 @pytest.fixture
 def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(campaign_file, "CHUNK", 2)
+    monkeypatch.setattr(checkpoint, "CHUNK", 2)
 
 
 @pytest.fixture(scope="module")
@@ -201,7 +201,7 @@ def folder(extended_design: Design, tmp_path_factory: pytest.TempPathFactory) ->
 def whole(folder: Path) -> bytes:
     """The file of a campaign that ran here without interruption."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(campaign_file, "CHUNK", 2)
+        patch.setattr(checkpoint, "CHUNK", 2)
         result = run(folder, "whole.parquet")
     assert result.exit_code == 0, result.output
     assert result.stdout.startswith("No guarantee speaks of all plants within W_a\n24 plants within W_a ->")
@@ -237,9 +237,7 @@ def test_the_file(folder: Path, whole: bytes, extended_design: Design) -> None:
 @pytest.mark.usefixtures("small_chunks")
 def test_a_killed_command_goes_on(folder: Path, whole: bytes) -> None:
     parts = folder / "resumed.parquet.parts"
-    code = (
-        "from experiments import campaign_file; campaign_file.CHUNK = 2; from experiments.__main__ import main; main()"
-    )
+    code = "from experiments.campaign import checkpoint; checkpoint.CHUNK = 2; from experiments.__main__ import main; main()"
     command = ["campaign", str(folder / "design.json"), *ARGUMENTS, "--output", str(folder / "resumed.parquet")]
     with subprocess.Popen([sys.executable, "-c", code, *command], cwd=ROOT) as process:
         wait_for_parts(parts, 2)

@@ -11,9 +11,9 @@ import pytest
 from click.testing import CliRunner
 from pyarrow import parquet
 
-from experiments import campaign_tables as module
 from experiments.__main__ import main
-from experiments.campaign_tables import campaign_tables
+from experiments.campaign import distributions as module
+from experiments.campaign.distributions import campaign_tables
 
 FACTS = {"plants": "40", "seed": "7", "limit": "12.5", "horizon_s": "25"}
 NEVER = {"peak_error": np.nan, "steady_error": np.nan, "recovery_s": np.nan}

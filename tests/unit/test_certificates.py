@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from experiments.cells import UNIT, Cells
-from experiments.certificates import Samples, absolute_integral, forced, reached, whole
-from experiments.exact_chain import chain, fastest, positive_exponential
-from experiments.physical_limits import RestLimit, periodic_limit
-from experiments.scenarios import Reference, sinusoid
-from experiments.steady_control import PI
-from identification.files import InputError
-from identification.plant import Mode, PlantModel
+from experiments.physical_limits.certificates import Samples, absolute_integral, forced, reached, whole
+from experiments.physical_limits.exact_chain import chain, fastest, positive_exponential
+from experiments.physical_limits.least_peak_error import RestLimit, periodic_limit
+from experiments.physical_limits.response_cells import UNIT, Cells
+from experiments.runs.references import Reference, sinusoid
+from experiments.runs.steady_control import PI
+from identification.base.errors import InputError
+from identification.model.plant import Mode, PlantModel
 
 DIGITS = 40
 CELLS = 90

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.anti_windup import AntiWindup, from_one_plus, second_order
-from design.block import Block
-from design.frequency import CERTIFIED, block_norm, frequency_grid, peak
-from design.popov import popov_sector
-from design.positivity import combined, multiplied, not_positive_at, squared_magnitude
-from identification.files import InputError
-from identification.plant import Mode
+from design.anti_windup.compensator import AntiWindup, from_one_plus, second_order
+from design.anti_windup.popov import popov_sector
+from design.blocks.block import Block
+from design.blocks.frequency_peak import CERTIFIED, block_norm, frequency_grid, peak
+from design.blocks.positivity import combined, multiplied, not_positive_at, squared_magnitude
+from identification.base.errors import InputError
+from identification.model.plant import Mode
 
 decades = st.floats(-2.0, 3.0)
 units = st.floats(-9.0, 9.0)

@@ -11,14 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import reference_run
 
-from design.contract import Design
-from experiments import compiled_loop
-from experiments.closed_loop import DivergenceError, simulate
-from experiments.crossings import first_exit
-from experiments.loops import design_loop, pid_loop
-from experiments.saturated_loop import Resets, SaturatedLoop
-from experiments.scenarios import PidBenchmark, sinusoid, thesis_reference
-from identification.files import InputError
+from design.design_file import Design
+from experiments.engine import compiled_loop
+from experiments.engine.crossings import first_exit
+from experiments.engine.saturated_loop import Resets, SaturatedLoop
+from experiments.engine.simulate import DivergenceError, simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.references import sinusoid
+from experiments.thesis.printed_choices import thesis_reference
+from experiments.thesis.studies.pid import PidBenchmark, pid_loop
+from identification.base.errors import InputError
 
 FREE = (-np.inf, np.inf)
 

@@ -15,14 +15,14 @@ import pytest
 from collocation import GENERATIONS, NODES, REACH, collocated_run
 from numpy.typing import NDArray
 
-from design.anti_windup import AntiWindup
-from design.contract import Design
-from design.extended import design_extended
-from experiments.closed_loop import Run, simulate
-from experiments.loops import design_loop
-from experiments.saturated_loop import Resets, SaturatedLoop
-from experiments.scenarios import Reference, SampledReference, sinusoid
-from identification.model import read_model
+from data.thesis import model_named
+from design.anti_windup.compensator import AntiWindup
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from experiments.engine.saturated_loop import Resets, SaturatedLoop
+from experiments.engine.simulate import Run, simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.references import Reference, SampledReference, sinusoid
 
 FREE = (-np.inf, np.inf)
 TOLERANCE = 1e-9
@@ -57,7 +57,7 @@ def test_the_cases_cover_all_pairs() -> None:
 @lru_cache
 def extended_at(delay_s: float) -> Design:
     """Chapter 4's design for the plant with another dead time."""
-    model = read_model("implied")
+    model = model_named("implied")
     plant = dataclasses.replace(model.plant, delay_s=delay_s)
     return design_extended(dataclasses.replace(model, plant=plant), [1.5], 4.0, [(2.0, 1.0)])
 

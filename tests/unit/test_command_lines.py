@@ -11,13 +11,14 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner, Result
 
+from data.thesis import model_named
 from design.__main__ import main as design_main
-from design.anti_windup import from_one_plus
-from design.block import Block
-from design.contract import Design
-from design.extended import design_extended
+from design.anti_windup.compensator import from_one_plus
+from design.blocks.block import Block
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
 from experiments.__main__ import main as experiments_main
-from identification.model import IdentifiedModel, read_model
+from identification.model.model_file import IdentifiedModel
 
 
 @pytest.fixture
@@ -76,7 +77,7 @@ def test_design_refuses_bad_models(
     [("gain", "seven", "expected a number"), ("gain", 0, "gain is 0"), ("delay_s", -0.1, "delay_s is -0.1")],
 )
 def test_design_refuses_bad_plants(runner: CliRunner, tmp_path: Path, member: str, value: object, part: str) -> None:
-    content = json.loads(read_model("implied").to_json())
+    content = json.loads(model_named("implied").to_json())
     content["plant"][member] = value
     model = tmp_path / "model.json"
     model.write_text(json.dumps(content), encoding="utf-8")

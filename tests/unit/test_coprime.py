@@ -7,11 +7,19 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from design.block import Block, geometric_scale, plant_block
-from design.contract import Design
-from design.coprime import CoprimeFactors, add, common_denominator, controller, coprime_factors, evaluate, parameter
-from identification.files import InputError
-from identification.model import IdentifiedModel
+from design.blocks.block import Block, geometric_scale, plant_block
+from design.design_file import Design
+from design.stability.coprime import (
+    CoprimeFactors,
+    add,
+    common_denominator,
+    controller,
+    coprime_factors,
+    evaluate,
+    parameter,
+)
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
 
 S = 1j * np.geomspace(1e-2, 3e3, 300) + 0.01
 often = settings(max_examples=100, deadline=None, derandomize=True)

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from design.block import Block, plant_block, plant_denominator, plant_numerator
-from design.contract import Design, read_design
-from design.coprime import controller, coprime_factors
-from design.delay_free import design_delay_free
-from design.extended import METHODS, design_extended
-from design.internal_model import internal_model
-from design.smith_predictor import (
+from design.blocks.block import Block, plant_block, plant_denominator, plant_numerator
+from design.chapter_2.design_delay_free import design_delay_free
+from design.chapter_2.internal_model import internal_model
+from design.chapters_3_4.design_extended import METHODS, design_extended
+from design.chapters_3_4.interpolate_Q import StableFunction, by_poles, by_zeros, conditions, lagrange
+from design.chapters_3_4.smith_predictor import (
     anti_windup_controller,
     anti_windup_theta1,
     augmented_plant,
@@ -22,10 +21,11 @@ from design.smith_predictor import (
     smith_controller,
     stabiliser,
 )
-from design.stable_interpolation import StableFunction, by_poles, by_zeros, conditions, lagrange
-from identification.files import InputError
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.design_file import Design, read_design
+from design.stability.coprime import controller, coprime_factors
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 S = 1j * np.geomspace(1e-2, 3e3, 300) + 0.01
 

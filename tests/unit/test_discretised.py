@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.integrate import quad_vec
 from scipy.signal import cont2discrete
 
-from identification.discretised import aliases, hold, pulse_response, pulse_zeros
-from identification.files import InputError
-from identification.plant import Mode, PlantModel
+from identification.base.errors import InputError
+from identification.model.plant import Mode, PlantModel
+from identification.model.pulse_response import aliases, hold, pulse_response, pulse_zeros
 
 Complex = NDArray[np.complex128]
 T = 2e-3

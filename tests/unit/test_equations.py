@@ -8,18 +8,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from design.anti_windup import AntiWindup, second_order, uncertainty_cost
-from design.block import Block, plant_block, plant_denominator, plant_numerator
-from design.closed_loop import closed_loop_poles
-from design.contract import Design
-from design.coprime import controller, coprime_factors, evaluate
-from design.delay_loop import DelayLoop
-from design.extended import design_extended
-from design.frequency import peak
-from design.internal_model import internal_model, reference_polynomial
-from design.quasi_polynomial import rightmost_roots
-from design.robustness import delay_loop, responses
-from design.smith_predictor import (
+from data.thesis import model_named, printed
+from design.anti_windup.compensator import AntiWindup, second_order, uncertainty_cost
+from design.blocks.block import Block, plant_block, plant_denominator, plant_numerator
+from design.blocks.frequency_peak import peak
+from design.chapter_2.internal_model import internal_model, reference_polynomial
+from design.chapters_3_4.design_extended import design_extended
+from design.chapters_3_4.interpolate_Q import StableFunction, by_zeros, conditions
+from design.chapters_3_4.smith_predictor import (
     FreePart,
     anti_windup_controller,
     anti_windup_theta1,
@@ -28,17 +24,21 @@ from design.smith_predictor import (
     smith_controller,
     stabiliser,
 )
-from design.stable_interpolation import StableFunction, by_zeros, conditions
-from experiments.claims import read_ledger
-from experiments.claims_inputs import rounded_inputs
-from experiments.claims_transfer_functions import bound_4_9, plant_4_8
-from experiments.closed_loop import simulate
-from experiments.loops import design_loop
-from experiments.saturated_loop import SaturatedLoop
-from experiments.scenarios import Reference, sinusoid
-from identification.model import IdentifiedModel, read_model
-from identification.plant import AdditiveBound, Mode, PlantModel
-from identification.thesis import printed
+from design.design_file import Design
+from design.hinf.closed_loop_norm import closed_loop_poles
+from design.stability.characteristic_roots import rightmost_roots
+from design.stability.coprime import controller, coprime_factors, evaluate
+from design.stability.delay_loop import DelayLoop
+from design.stability.margins import delay_loop, responses
+from experiments.engine.saturated_loop import SaturatedLoop
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.references import Reference, sinusoid
+from experiments.thesis.claims.checks.transfer_functions import bound_4_9, plant_4_8
+from experiments.thesis.claims.inputs import rounded_inputs
+from experiments.thesis.claims.ledger import read_ledger
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 Complex = NDArray[np.complex128]
 
@@ -451,7 +451,7 @@ def test_2_20_and_3_1_the_plant_as_printed(seed: int) -> None:
 
 
 def test_table_2_1_as_printed() -> None:
-    plant = read_model("table").plant
+    plant = model_named("table").plant
     assert (plant.gain, plant.delay_s, plant.integrators) == (7.1, 8.1e-3, 1)
     assert plant.zero_modes == (Mode(175.0, 0.08), Mode(930.0, 0.04))
     assert plant.pole_modes == (Mode(285.0, 0.02), Mode(960.0, 0.1))
@@ -806,7 +806,7 @@ def test_4_9_the_bound_printed_again() -> None:
     assert bound_4_9({}) == pytest.approx({"W_a.gain": 0.011, "W_a.corner": 20, "W_a.two_zeta": 0.02, "W_a.omega": 280})
     s = points(np.random.default_rng(0))
     W_a = 0.011 * (1 + s / 20) / (1 + 0.02 * (s / 280) + (s / 280) ** 2)
-    np.testing.assert_allclose(read_model("implied").additive_bound(s), W_a, rtol=1e-12)
+    np.testing.assert_allclose(model_named("implied").additive_bound(s), W_a, rtol=1e-12)
 
 
 def test_tables_4_1_and_4_2_as_printed() -> None:

@@ -12,18 +12,19 @@ from collocation import collocated_run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.anti_windup import from_one_plus
-from design.block import Block
-from design.contract import Design
-from design.delay_free import design_delay_free
-from design.extended import design_extended
-from experiments.closed_loop import simulate
-from experiments.compiled_loop import compile_loop
-from experiments.loops import design_loop
-from experiments.saturated_loop import SaturatedLoop
-from experiments.scenarios import Reference, SampledReference, sinusoid
-from identification.model import IdentifiedModel, read_model
-from identification.plant import AdditiveBound, Mode, PlantModel
+from data.thesis import model_named
+from design.anti_windup.compensator import from_one_plus
+from design.blocks.block import Block
+from design.chapter_2.design_delay_free import design_delay_free
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from experiments.engine.compiled_loop import compile_loop
+from experiments.engine.saturated_loop import SaturatedLoop
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.references import Reference, SampledReference, sinusoid
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 FREE = (-np.inf, np.inf)
 
@@ -123,7 +124,7 @@ def test_a_loop_that_begins_with_the_third_power(kind: str, row: tuple[float, fl
 @lru_cache
 def designs() -> dict[str, Design]:
     """Designs whose path from r to u begins with t, t^2, t^3 and more."""
-    implied = read_model("implied")
+    implied = model_named("implied")
     one_mode = dataclasses.replace(
         integrator(0.01), plant=PlantModel(2.3, (Mode(40.0, 0.05),), (Mode(60.0, 0.03),), 0.01)
     )
@@ -161,7 +162,7 @@ def test_the_first_steps_are_those_of_collocation(name: str, reference: str, lim
 
 @pytest.mark.parametrize("kind", ["none", "thesis", "corrected"])
 def test_a_brief_dead_time_in_a_loop_that_saturates_at_once(kind: str) -> None:
-    implied = read_model("implied")
+    implied = model_named("implied")
     plant = dataclasses.replace(implied.plant, delay_s=1e-5)  # 1 % of its fastest time constant
     design = design_extended(dataclasses.replace(implied, plant=plant), [1.5], 4.0, [(2.0, 1.0)])
     anti_windup = None if kind == "none" else design.compensator(kind)

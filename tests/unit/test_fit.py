@@ -10,15 +10,16 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from identification.files import InputError
-from identification.fit import FitResult, fit_plant
-from identification.frequency_response import FrequencyResponse, read_sweeps
-from identification.least_squares import log_jacobian, response_of
-from identification.likelihood import noise_levels
-from identification.plant import Mode, PlantModel
-from identification.report import fit_to_dict, remarks
-from identification.start import group_delay
-from identification.structure import Structure, Wanted
+from identification.base.errors import InputError
+from identification.fitting.first_guess import group_delay
+from identification.fitting.fit_plant import FitResult, fit_plant
+from identification.fitting.least_squares import log_jacobian, response_of
+from identification.fitting.likelihood import noise_levels
+from identification.model.plant import Mode, PlantModel
+from identification.model.structure import Structure, Wanted
+from identification.output.fit_facts import fit_to_dict, remarks
+from identification.sweeps.read_sweeps import read_sweeps
+from identification.sweeps.response import FrequencyResponse
 
 DATA = Path(__file__).resolve().parents[2] / "data" / "elevation"
 ONE_PAIR = PlantModel(-4.0, (Mode(60.0, 0.02),), (Mode(90.0, 0.05),), 6e-3)

@@ -12,9 +12,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sweep_columns import COLUMNS, FREQUENCY_HZ, RESPONSE
 
-from identification.files import InputError
-from identification.frequency_response import FrequencyResponse, input_files, read_sweeps
-from identification.thesis import DATA
+from data.thesis import THESIS
+from identification.base.errors import InputError
+from identification.sweeps.read_sweeps import input_files, read_sweeps
+from identification.sweeps.response import FrequencyResponse
 
 FRF = ["frequency_hz,magnitude_db,phase_deg,coherence"] + [f"{f},{-f},{10 * f},0.9" for f in range(1, 11)]
 RAW = ["time_s,input,output"] + [f"{0.01 * k:.4f},{np.sin(k * k / 500):.6f},{np.sin(k):.6f}" for k in range(200)]
@@ -289,7 +290,7 @@ def test_refusal_in_one_sentence(tmp_path: Path, lines: list[str], sentence: str
 
 def _elevation(tmp_path: Path, kind: str, header: str) -> Path:
     """The first synthetic test under another header."""
-    lines = (DATA / "elevation" / f"synthetic_test_1_{kind}.csv").read_text(encoding="utf-8").splitlines()
+    lines = (THESIS.parent / "elevation" / f"synthetic_test_1_{kind}.csv").read_text(encoding="utf-8").splitlines()
     return _write(tmp_path, ["# another header", header, *lines[4:]])
 
 
@@ -302,7 +303,7 @@ def test_swapped_input_and_output(tmp_path: Path) -> None:
         r"expected an output that follows \(are the two swapped\?\)",
         str(refusal.value),
     )
-    honest = _only_test(DATA / "elevation" / "synthetic_test_1_frf.csv")
+    honest = _only_test(THESIS.parent / "elevation" / "synthetic_test_1_frf.csv")
     rows = [f"{w},{r.real},{r.imag}" for w, r in zip(honest.omega, 1 / honest.response, strict=True)]
     path = _write(tmp_path, ["omega,real,imag", *rows])
     with pytest.raises(InputError) as refusal:
@@ -321,7 +322,7 @@ def test_phase_wrapped_in_the_other_unit(tmp_path: Path) -> None:
         f"{path}, line 232: phase_rad is 174.965 after the -178.964 of line 231, as if wrapped in degrees; "
         "expected radians"
     )
-    honest = _only_test(DATA / "elevation" / "synthetic_test_1_frf.csv")
+    honest = _only_test(THESIS.parent / "elevation" / "synthetic_test_1_frf.csv")
     rows = zip(honest.omega, np.abs(honest.response), np.angle(honest.response), strict=True)
     path = _write(tmp_path, ["omega,magnitude,phase_deg", *(f"{w},{m},{p:.4f}" for w, m, p in rows)])
     with pytest.raises(InputError) as refusal:
@@ -333,7 +334,7 @@ def test_phase_wrapped_in_the_other_unit(tmp_path: Path) -> None:
 
 
 def test_the_synthetic_tests_are_read_as_a_folder(tmp_path: Path) -> None:
-    for path in (DATA / "elevation").glob("*_frf.csv"):
+    for path in (THESIS.parent / "elevation").glob("*_frf.csv"):
         shutil.copy(path, tmp_path)
     tests = read_sweeps([tmp_path])
     assert [test.name for test in tests] == [f"synthetic_test_{k}_frf.csv" for k in range(1, 7)]

@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from identification.__main__ import main
-from identification.model import read_model
-from identification.plant import Mode, PlantModel
+from identification.model.model_file import read_model
+from identification.model.plant import Mode, PlantModel
 
 PLANT = PlantModel(-2.0, (Mode(50.0, 0.03),), (Mode(80.0, 0.02),), 5e-3)
 
@@ -39,7 +39,7 @@ def test_writes_a_model_that_design_can_read(tmp_path: Path, sweeps: list[Path])
     output = tmp_path / "model.json"
     result = _fit(*sweeps, "--output", output)
     assert result.exit_code == 0, result.output
-    model = read_model(str(output))
+    model = read_model(output)
     assert model.plant.gain == pytest.approx(-2.0, rel=0.02)
     assert model.plant.pole_modes[0].omega == pytest.approx(80.0, rel=0.01)
     assert model.standard_errors is not None
@@ -80,7 +80,7 @@ def test_raw_and_frequency_response_together(tmp_path: Path) -> None:
     files = [data / "synthetic_test_1_raw.csv", data / "synthetic_test_1_frf.csv"]
     result = _fit(*files, "--modes", 2, "--output", output)
     assert result.exit_code == 0, result.output
-    assert read_model(str(output)).fit["synthetic"] is True
+    assert read_model(output).fit["synthetic"] is True
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
@@ -147,7 +147,7 @@ def test_structure_loss_and_order_of_the_bound_as_asked(tmp_path: Path, sweeps: 
     output = tmp_path / "model.json"
     asked = ["--modes", "1/2", "--real", "1/0", "--integrators", 1, "--loss", "soft-l1", "--bound-order", 3]
     assert _fit(*sweeps, *asked, "--output", output).exit_code == 0
-    model = read_model(str(output))
+    model = read_model(output)
     assert model.fit["structure"] == "1 integrator, 1 zero mode, 2 pole modes, 1 real zero"
     assert model.fit["loss"] == "soft-L1"
     assert model.additive_bound.order == 3

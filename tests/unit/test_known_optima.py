@@ -9,9 +9,9 @@ import pytest
 from nehari import nehari_optimum
 from scipy.linalg import eigh, solve_continuous_are
 
-from design.block import Block, from_polynomial, polynomial
-from design.contract import Design
-from design.mixed_sensitivity import Synthesis, infimum, mixed_sensitivity
+from design.blocks.block import Block, from_polynomial, polynomial
+from design.design_file import Design
+from design.hinf.mixed_sensitivity import Synthesis, infimum, mixed_sensitivity
 
 Problem = tuple[Block, Block, Block]  # G, W1, W2
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from identification.frequency_response import read_sweeps
-from identification.mistakes import bends, lead_time, wrap
-from identification.plant import Mode, PlantModel
-from identification.thesis import DATA
+from data.thesis import THESIS
+from identification.model.plant import Mode, PlantModel
+from identification.sweeps.read_sweeps import read_sweeps
+from identification.sweeps.swapped_or_wrong_unit import bends, lead_time, wrap
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -96,7 +96,7 @@ def test_a_pure_lead_is_measured(factor: float) -> None:
 
 
 def test_what_the_synthetic_tests_become_when_swapped() -> None:
-    (test,) = read_sweeps([DATA / "elevation" / "synthetic_test_2_frf.csv"])
+    (test,) = read_sweeps([THESIS.parent / "elevation" / "synthetic_test_2_frf.csv"])
     assert lead_time(test.omega, test.response) == 0
     assert lead_time(test.omega, 1 / test.response) == pytest.approx(8.1e-3, rel=0.1)  # the dead time
 

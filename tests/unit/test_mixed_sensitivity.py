@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, eigvals
 
-import design.mixed_sensitivity as mixed_sensitivity_module
-from design.block import Block, bound_block
-from design.central_controller import central_controller
-from design.closed_loop import closed_loop_poles
-from design.contract import Design
-from design.frequency import peak
-from design.mixed_sensitivity import mixed_sensitivity
-from design.pick import Obstacle, Problem, SynthesisError, is_feasible
-from design.realization import realize
-from identification.files import InputError
+import design.hinf.mixed_sensitivity as mixed_sensitivity_module
+from design.blocks.block import Block, bound_block
+from design.blocks.frequency_peak import peak
+from design.blocks.state_space import realize
+from design.design_file import Design
+from design.hinf.central_controller import central_controller
+from design.hinf.closed_loop_norm import closed_loop_poles
+from design.hinf.mixed_sensitivity import mixed_sensitivity
+from design.hinf.pick import Obstacle, Problem, SynthesisError, is_feasible
+from identification.base.errors import InputError
 
 PROBLEMS = {
     "unstable": (Block(1.0, (-4.0,), (-1.0, 2.0)), Block(1.0, (), (-0.1,)), Block(0.3, (-5.0,))),

@@ -7,17 +7,17 @@ import dataclasses
 import numpy as np
 import pytest
 
-from design.audit import audit, covered_delay
-from design.block import Block, plant_block
-from design.contract import Design
-from design.delay_loop import DelayLoop
-from design.extended import design_extended
-from design.quasi_polynomial import roots_right_of
-from design.smith_predictor import stabiliser
-from experiments.closed_loop import simulate
-from experiments.saturated_loop import SaturatedLoop
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.auditing.audit_design import audit, covered_delay
+from design.blocks.block import Block, plant_block
+from design.chapters_3_4.design_extended import design_extended
+from design.chapters_3_4.smith_predictor import stabiliser
+from design.design_file import Design
+from design.stability.characteristic_roots import roots_right_of
+from design.stability.delay_loop import DelayLoop
+from experiments.engine.saturated_loop import SaturatedLoop
+from experiments.engine.simulate import simulate
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 
 def loop_with_delay(design: Design, delay_s: float) -> DelayLoop:

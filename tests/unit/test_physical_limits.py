@@ -13,16 +13,16 @@ import pytest
 from click.testing import CliRunner
 from held_plant import PLANTS, held_response
 
-from design.contract import Design
-from experiments import physical_limits
+from design.design_file import Design
 from experiments.__main__ import main
-from experiments.certificates import Samples, reached, whole
-from experiments.intervals import Interval
-from experiments.linear_programs import PeakProgram
-from experiments.physical_limits import RestLimit, limits_tables, periodic_limit
-from experiments.scenarios import Reference, sinusoid
-from identification.files import InputError
-from identification.plant import Mode, PlantModel
+from experiments.physical_limits import least_peak_error
+from experiments.physical_limits.certificates import Samples, reached, whole
+from experiments.physical_limits.intervals import Interval
+from experiments.physical_limits.least_peak_error import RestLimit, limits_tables, periodic_limit
+from experiments.physical_limits.peak_program import PeakProgram
+from experiments.runs.references import Reference, sinusoid
+from identification.base.errors import InputError
+from identification.model.plant import Mode, PlantModel
 
 CHAPTER_2 = sinusoid(50.0, math.pi / 2, math.pi / 2, -50.0)
 CHAPTER_4 = sinusoid(50.0, 1.5, math.pi / 2, 0.0)
@@ -259,7 +259,7 @@ def test_band_must_be_positive(band: float) -> None:
 def tables(extended_design: Design) -> dict[str, pd.DataFrame]:
     patch = pytest.MonkeyPatch()
     for name, value in {"STEPS": 60, "FEWER_STEPS": 60, "STARTS": 6, "RUN_PERIODS": 6}.items():
-        patch.setattr(physical_limits, name, value)
+        patch.setattr(least_peak_error, name, value)
     found = limits_tables(extended_design, [12.5, 9.5])
     patch.undo()
     return found
@@ -291,11 +291,11 @@ def test_rows_are_ascending_and_the_summary_is_for_the_first_limit(tables: dict[
 
 def test_usual_limits(delay_free_design: Design, monkeypatch: pytest.MonkeyPatch) -> None:
     """The printed one, for which the summary is, and multiples of the required one; nothing is solved here."""
-    monkeypatch.setattr(physical_limits, "periodic_limit", lambda *_: Interval(9.0, 9.0))
-    monkeypatch.setattr(physical_limits, "RUN_PERIODS", 1)
+    monkeypatch.setattr(least_peak_error, "periodic_limit", lambda *_: Interval(9.0, 9.0))
+    monkeypatch.setattr(least_peak_error, "RUN_PERIODS", 1)
     monkeypatch.setattr(RestLimit, "at", lambda *_: Interval(1.0, 2.0))
     monkeypatch.setattr(RestLimit, "_known", lambda *_: Interval(1.0, 2.0))
-    monkeypatch.setattr(physical_limits, "HORIZON", 1)
+    monkeypatch.setattr(least_peak_error, "HORIZON", 1)
     found = limits_tables(delay_free_design)
     required = found["limits_delay_free"]["required"][0]
     shares = found["limits_delay_free"]["limit"] / required
@@ -311,7 +311,7 @@ def test_command_line(extended_design: Design, tmp_path: Path, monkeypatch: pyte
         asked.append((design.kind, limits))
         return {"limits_extended": pd.DataFrame({"limit": [2.0]}), "limits_extended_summary": pd.DataFrame({"a": [1]})}
 
-    monkeypatch.setattr("experiments.physical_limits.limits_tables", found)
+    monkeypatch.setattr("experiments.physical_limits.least_peak_error.limits_tables", found)
     path = tmp_path / "design.json"
     path.write_text(extended_design.to_json(), encoding="utf-8")
     command = ["limits", str(path), "--output", str(tmp_path)]

@@ -9,14 +9,14 @@ import pytest
 from flint import acb, arb_poly, ctx
 from nehari import nehari_excess
 
-from design.ball import UndecidedError, decided, negative_pivot, polynomial_roots
-from design.block import Block
-from design.closed_loop import closed_loop_norm
-from design.delay_free import stabiliser_problem
-from design.mixed_sensitivity import Synthesis, mixed_sensitivity
-from identification.digits import lower_end, upper_end
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.blocks.ball import UndecidedError, decided, negative_pivot, polynomial_roots
+from design.blocks.block import Block
+from design.chapter_2.design_delay_free import stabiliser_problem
+from design.hinf.closed_loop_norm import closed_loop_norm
+from design.hinf.mixed_sensitivity import Synthesis, mixed_sensitivity
+from identification.base.digits import lower_end, upper_end
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 Case = tuple[IdentifiedModel, float, float]  # model, period, epsilon
 

@@ -7,10 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from design.block import bound_block, plant_block
-from identification.files import InputError
-from identification.model import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.blocks.block import bound_block, plant_block
+from identification.base.errors import InputError
+from identification.model.model_file import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 S = 1j * np.geomspace(0.1, 100, 50)
 PLANT = PlantModel(

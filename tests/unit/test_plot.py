@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from identification.frequency_response import FrequencyResponse
-from identification.plant import AdditiveBound, Mode, PlantModel
-from identification.plot import decibel, draw_distance, draw_fit, draw_phase, draw_relative_distance
+from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.output.plots import decibel, draw_distance, draw_fit, draw_phase, draw_relative_distance
+from identification.sweeps.response import FrequencyResponse
 
 PLANT = PlantModel(-2.0, (Mode(50.0, 0.03),), (Mode(80.0, 0.02),), 0.05)
 BOUND = AdditiveBound.printed_form(0.3, 40.0, 60.0, 0.2)

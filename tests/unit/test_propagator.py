@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from experiments.crossings import leave
-from experiments.mesh import gap, insert, shift
-from experiments.propagator import advance, compressed, tabulate
+from experiments.engine.crossings import leave
+from experiments.engine.kinks import gap, insert, shift
+from experiments.engine.step_table import advance, compressed, tabulate
 
 STEP = 0.3
 

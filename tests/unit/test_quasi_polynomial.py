@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from scipy.linalg import block_diag
 from scipy.special import lambertw
 
-from design import axis
-from design.block import Block, plant_block
-from design.contract import Design
-from design.delay_loop import DelayLoop
-from design.quasi_polynomial import _discretised_roots, closing_omega, rightmost_roots, roots_right_of
-from design.realization import realize
-from identification.files import InputError
+from design.blocks.block import Block, plant_block
+from design.blocks.state_space import realize
+from design.design_file import Design
+from design.stability import axis
+from design.stability.characteristic_roots import _discretised_roots, closing_omega, rightmost_roots, roots_right_of
+from design.stability.delay_loop import DelayLoop
+from identification.base.errors import InputError
 
 some = settings(max_examples=25, deadline=None, derandomize=True)
 ONE, NONE = Block(1.0), Block(0.0)

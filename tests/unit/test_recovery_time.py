@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.block import bound_block
-from design.corrected import RESOLVED, SETTLED, WORTH, corrected
-from design.extended import design_extended
-from design.frequency import block_norm
-from identification.files import InputError
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.anti_windup.corrected_compensator import RESOLVED, SETTLED, WORTH, corrected
+from design.blocks.block import bound_block
+from design.blocks.frequency_peak import block_norm
+from design.chapters_3_4.design_extended import design_extended
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 shares = st.floats(0.0, 2.0)
 bounds = st.builds(

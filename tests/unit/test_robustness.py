@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.block import Block, bound_block, geometric_scale, plant_block
-from design.contract import Design
-from design.delay_loop import DelayLoop
-from design.extended import design_extended
-from design.quasi_polynomial import rightmost_roots, roots_right_of
-from design.realization import realize
-from design.robustness import Margins, delay_loop, margins_of, tracking_floor
-from identification.files import InputError
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.blocks.block import Block, bound_block, geometric_scale, plant_block
+from design.blocks.state_space import realize
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from design.stability.characteristic_roots import rightmost_roots, roots_right_of
+from design.stability.delay_loop import DelayLoop
+from design.stability.margins import Margins, delay_loop, margins_of, tracking_floor
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 ONE, NONE = Block(1.0), Block(0.0)
 BOUND = AdditiveBound.printed_form(0.01, 20.0, 280.0, 0.05)

@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner, Result
 
-from design.contract import Design
+from data.thesis import model_named
+from design.design_file import Design
 from experiments.__main__ import main
-from experiments.sampled import Drive, simulate_sampled
-from experiments.scenarios import Reference
-from identification.model import read_model
+from experiments.drive.sampled_loop import Drive, simulate_sampled
+from experiments.runs.references import Reference
 
 SIMULATE = ["--limit", "12", "--anti-windup", "corrected", "--until", "1", "--sample-time", "0.01"]
 SAMPLED = ["--limit", "12", "--anti-windup", "corrected", "--until", "1", "--rate", "800", "--method", "tustin"]
@@ -103,7 +103,7 @@ def test_sampled_writes_the_run(extended_design: Design, design_json: Path) -> N
         extended_design.compensator("corrected"),
         Drive(800.0, "tustin", (-12.0, 12.0), 0.01, 500.0, 0.001),
         1.0,
-        read_model("table").plant,
+        model_named("table").plant,
     )
     assert len(table) == 801
     for name, values in vars(run).items():

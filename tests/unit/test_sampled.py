@@ -13,21 +13,22 @@ from sampled_response import response
 from scipy.integrate import solve_ivp
 from scipy.signal import lsim, zpk2ss
 
-from design.anti_windup import AntiWindup, second_order
-from design.block import Block, plant_block
-from design.contract import Design
-from design.extended import design_extended
-from design.realization import realize
-from experiments.closed_loop import DivergenceError, simulate
-from experiments.loops import design_loop
-from experiments.sampled import Drive, SampledRun, simulate_sampled
-from experiments.sampled_controller import METHODS, sample_block
-from experiments.sampled_rates import sampled_rates_tables
-from experiments.scenarios import Reference, SampledReference, sinusoid, thesis_reference
-from identification.discretised import pulse_response
-from identification.files import InputError
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.anti_windup.compensator import AntiWindup, second_order
+from design.blocks.block import Block, plant_block
+from design.blocks.state_space import realize
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from experiments.drive.difference_equations import METHODS, sample_block
+from experiments.drive.sampled_loop import Drive, SampledRun, simulate_sampled
+from experiments.engine.simulate import DivergenceError, simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.references import Reference, SampledReference, sinusoid
+from experiments.thesis.printed_choices import thesis_reference
+from experiments.thesis.studies.sampled_rates import sampled_rates_tables
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.pulse_response import pulse_response
 
 FREE = (-math.inf, math.inf)
 OTHER = PlantModel(-0.4, (Mode(20.0, 0.03),), (Mode(32.0, 0.02),), 0.06)

@@ -7,13 +7,13 @@ import pytest
 from sampled_response import response
 from scipy.signal import bilinear_zpk, cont2discrete, freqz_zpk
 
-from design.block import Block, plant_block
-from design.contract import Design
-from design.realization import realize
-from experiments.sampled_controller import SampledBlock, sample_block, split
-from identification.discretised import pulse_response
-from identification.files import InputError
-from identification.plant import Mode, PlantModel
+from design.blocks.block import Block, plant_block
+from design.blocks.state_space import realize
+from design.design_file import Design
+from experiments.drive.difference_equations import SampledBlock, sample_block, split
+from identification.base.errors import InputError
+from identification.model.plant import Mode, PlantModel
+from identification.model.pulse_response import pulse_response
 
 T = 2e-3
 OMEGA = np.geomspace(0.5, 0.98 * np.pi / T, 80)

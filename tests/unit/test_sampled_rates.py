@@ -8,15 +8,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from design.contract import Design
-from design.extended import design_extended
-from experiments import sampled_rates
-from experiments.closed_loop import DivergenceError, simulate
-from experiments.loops import design_loop
-from experiments.sampled import Drive, simulate_sampled
-from experiments.scenarios import thesis_reference
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from experiments.drive.sampled_loop import Drive, simulate_sampled
+from experiments.engine.simulate import DivergenceError, simulate
+from experiments.runs.design_loop import design_loop
+from experiments.thesis.printed_choices import thesis_reference
+from experiments.thesis.studies import sampled_rates
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 LIMIT = 80.0
 

@@ -11,23 +11,24 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from design.anti_windup import second_order
-from design.circle_criterion import circle_sector
-from design.contract import Design
-from design.extended import design_extended
-from design.popov import popov_sector
+from design.anti_windup.circle_criterion import circle_sector
+from design.anti_windup.compensator import second_order
+from design.anti_windup.popov import popov_sector
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
 from experiments.__main__ import main
-from experiments.closed_loop import simulate
-from experiments.delay_free import delay_free_tables
-from experiments.extended import extended_tables
-from experiments.guarantee import Guarantee, guarantee, guarantee_within, sector_text
-from experiments.loops import design_loop
-from experiments.scenarios import Reference, SampledReference, sinusoid, thesis_reference
-from experiments.sector_promise import Verdict, judge_run, needed_sector, steady_control, verdict
-from experiments.tracking import loops, run_all, tracking_summary, verdicts
-from experiments.uncertain_plants import PlantsWithin
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from experiments.campaign.draw_plants import PlantsWithin
+from experiments.engine.simulate import simulate
+from experiments.runs.compare_anti_windups import loops, run_all, tracking_summary, verdicts
+from experiments.runs.design_loop import design_loop
+from experiments.runs.guarantee import Guarantee, guarantee, guarantee_within, sector_text
+from experiments.runs.references import Reference, SampledReference, sinusoid
+from experiments.runs.sector_promise import Verdict, judge_run, needed_sector, steady_control, verdict
+from experiments.thesis.printed_choices import thesis_reference
+from experiments.thesis.studies.chapter_2 import delay_free_tables
+from experiments.thesis.studies.chapter_4 import extended_tables
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 CHAPTER_4 = sinusoid(50.0, 1.5, np.pi / 2, 0.0)
 AMPLITUDE = 50 * 1.5 / 7.105  # of the control that follows it, but for the modes

@@ -7,19 +7,19 @@ import dataclasses
 import numpy as np
 import pytest
 
-from design import stable_intervals
-from design.audit import audit
-from design.audit_text import audit_text
-from design.block import Block
-from design.contract import Design
-from design.delay_loop import DelayLoop
-from design.extended import design_extended
-from design.quasi_polynomial import rightmost_roots
-from design.robustness import Margins, delay_loop, margins_of
-from design.stable_intervals import Interval
-from identification.files import InputError
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.auditing.as_text import audit_text
+from design.auditing.audit_design import audit
+from design.blocks.block import Block
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from design.stability import stable_intervals
+from design.stability.characteristic_roots import rightmost_roots
+from design.stability.delay_loop import DelayLoop
+from design.stability.margins import Margins, delay_loop, margins_of
+from design.stability.stable_intervals import Interval
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 ONE, NONE = Block(1.0), Block(0.0)
 BOUND = AdditiveBound.printed_form(0.01, 2.0, 3.0, 0.5)

@@ -8,11 +8,11 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from experiments.intervals import Interval
-from experiments.physical_limits import periodic_limit
-from experiments.scenarios import Reference, sinusoid
-from experiments.steady_control import Wave, peak
-from identification.plant import Mode, PlantModel
+from experiments.physical_limits.intervals import Interval
+from experiments.physical_limits.least_peak_error import periodic_limit
+from experiments.runs.references import Reference, sinusoid
+from experiments.runs.steady_control import Wave, peak
+from identification.model.plant import Mode, PlantModel
 
 PLANT = PlantModel(3.0, (Mode(30.0, 0.05),), (Mode(45.0, 0.02),), 0.03)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.least_squares import response_of
-from identification.likelihood import Likely
-from identification.moves import neighbours, reached_from, within_band
-from identification.structure import Structure, Wanted
+from identification.fitting.least_squares import response_of
+from identification.fitting.likelihood import Likely
+from identification.fitting.neighbouring_structures import neighbours, reached_from, within_band
+from identification.model.structure import Structure, Wanted
 
 OMEGA = np.geomspace(0.3, 3.0, 40)
 

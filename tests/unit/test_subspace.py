@@ -10,11 +10,12 @@ import pandas as pd
 import pytest
 from held_plant import PLANTS, held_response
 
-from identification import subspace
-from identification.frequency_response import Record, read_sweeps
-from identification.model import read_model
-from identification.plant import Mode, PlantModel
-from identification.subspace import SubspaceCheck, check_modes
+from data.thesis import model_named
+from identification.fitting import subspace_check
+from identification.fitting.subspace_check import SubspaceCheck, check_modes
+from identification.model.plant import Mode, PlantModel
+from identification.sweeps.read_sweeps import read_sweeps
+from identification.sweeps.response import Record
 
 DATA = Path(__file__).resolve().parents[2] / "data" / "elevation"
 T = 2e-3
@@ -75,7 +76,7 @@ def test_the_modes_of_the_shipped_records(number: int) -> None:
         tuple(Mode(truth[f"{kind}_omega_{i}"], truth[f"{kind}_zeta_{i}"]) for i in (1, 2)) for kind in ("zero", "pole")
     )
     assert test.record is not None
-    check = check_modes(read_model("implied").plant, test.record, (test.omega[0], test.omega[-1]))
+    check = check_modes(model_named("implied").plant, test.record, (test.omega[0], test.omega[-1]))
     omega, zeta = _errors(PlantModel(1.0, zeros, poles, 0.0), check)
     assert max(omega) < 2e-3
     assert max(zeta) < 0.1
@@ -112,7 +113,7 @@ def test_no_answer_is_said_and_nothing_leaks(
         np.log(np.zeros(1))
         raise failure
 
-    monkeypatch.setattr(subspace.sippy_unipi, "system_identification", fails)
+    monkeypatch.setattr(subspace_check.sippy_unipi, "system_identification", fails)
     plant = PLANTS["no integrator, real pole"]
     check = check_modes(plant, _record(plant), BAND)
     assert check.modes == ()

@@ -7,11 +7,11 @@ import pytest
 from held_plant import PLANTS, held_response, over_hold
 from numpy.typing import NDArray
 
-from identification.discretised import aliases
-from identification.excited_lines import whole_periods
-from identification.files import InputError
-from identification.plant import Mode, PlantModel
-from identification.sweep import estimate_response
+from identification.base.errors import InputError
+from identification.model.plant import Mode, PlantModel
+from identification.model.pulse_response import aliases
+from identification.sweeps.estimate_response import estimate_response
+from identification.sweeps.excited_lines import whole_periods
 
 Real = NDArray[np.float64]
 DT = 1e-3

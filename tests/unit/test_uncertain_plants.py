@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from design.audit import covered_delay
-from experiments.distance_certificate import stays_below
-from experiments.uncertain_plants import ABOVE, PlantsWithin, as_factors
-from identification.files import InputError
-from identification.model import IdentifiedModel
-from identification.plant import AdditiveBound, Mode, PlantModel
+from design.auditing.audit_design import covered_delay
+from experiments.campaign.distance_certificate import stays_below
+from experiments.campaign.draw_plants import ABOVE, PlantsWithin, as_factors
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 
 def modes(count: int, first: float, ratio: float) -> tuple[Mode, ...]:

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
-from identification import uncertainty
-from identification.envelope import envelope_of
-from identification.files import InputError
-from identification.frequency_response import FrequencyResponse
-from identification.plant import AdditiveBound, Mode, PlantModel
-from identification.uncertainty import HIGHEST_ORDER, bound_residuals
+from identification.base.errors import InputError
+from identification.bound import bound_residuals as module
+from identification.bound.bound_residuals import HIGHEST_ORDER, bound_residuals
+from identification.bound.envelope import envelope_of
+from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.sweeps.response import FrequencyResponse
 
 Real = NDArray[np.float64]
 
@@ -265,7 +265,7 @@ def test_what_is_not_finite_never_passes(value: float) -> None:
 
 
 def test_a_bound_that_misses_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(uncertainty, "MARGIN", -1e-3)
+    monkeypatch.setattr(module, "MARGIN", -1e-3)
     with pytest.raises(RuntimeError, match="misses a residual by a factor 1"):
         bound_residuals(PLANT, _tests(FLAT))
 

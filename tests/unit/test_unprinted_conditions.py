@@ -11,14 +11,17 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from experiments import thesis_designs, unprinted_conditions, unprinted_weights
+from data.thesis import printed
 from experiments.__main__ import main
-from experiments.closed_loop import Run, simulate
-from experiments.initial_output import Conditions, Point, starting_at, with_pade_at_rest
-from experiments.joint_conditions import judged, together
-from experiments.loops import design_loop
-from experiments.printed_number import PrintedNumber
-from experiments.printed_outcomes import (
+from experiments.engine.simulate import Run, simulate
+from experiments.runs.design_loop import design_loop
+from experiments.thesis import printed_choices
+from experiments.thesis.claims.printed_number import PrintedNumber
+from experiments.thesis.unprinted import chapter_2_weights, search
+from experiments.thesis.unprinted.chapter_2_weights import Weights, delay_free_rows, delay_free_scan, errors, loop_of
+from experiments.thesis.unprinted.chapter_4_conditions import Conditions, Point, starting_at, with_pade_at_rest
+from experiments.thesis.unprinted.joint_search import judged, together
+from experiments.thesis.unprinted.printed_outcomes import (
     CLAIMS,
     READINGS,
     printed_outcomes,
@@ -27,9 +30,7 @@ from experiments.printed_outcomes import (
     with_anti_windup,
     without_anti_windup,
 )
-from experiments.unprinted_conditions import Grid, alone, every_condition, grid_of, scanned
-from experiments.unprinted_weights import Weights, delay_free_rows, delay_free_scan, errors, loop_of
-from identification.thesis import printed
+from experiments.thesis.unprinted.search import Grid, alone, every_condition, grid_of, scanned
 
 COARSE = Grid(np.array([0.9, 1.1, 1.2, 1.3, 1.6, 1.9, 2.4]), np.array([1.001, 1.05, 1.1]), np.linspace(0.8, 1.2, 3))
 
@@ -234,12 +235,12 @@ def test_from_rest_each_printed_outcome_wants_another_limit(separate: pd.DataFra
 
 def test_the_joint_search_betters_every_point_of_the_grid(implied_exact: Conditions, points: pd.DataFrame) -> None:
     found = together([implied_exact], points)
-    for search, converging in (("together", False), ("together, converging", True)):
+    for name, converging in (("together", False), ("together, converging", True)):
         grid = [
             judged(Point(row["limit"], row["initial_output"]), row, converging).miss
             for row in points.to_dict("records")
         ]
-        best = found[found["search"] == search]
+        best = found[found["search"] == name]
         assert list(best["outcome"]) == list(READINGS)
         assert best["worst_miss"].nunique() == 1
         assert best["worst_miss"].iloc[0] <= min(grid)
@@ -295,16 +296,16 @@ def test_a_misprinted_limit_would_give_the_error_of_chapter_2(needs: pd.DataFram
         0
     ]
     assert row["limit"] == pytest.approx(10.98, abs=0.005)
-    again = errors(loop_of(thesis_designs.chapter_2("implied")), row["limit"], 0.0)["peak_percent"]
+    again = errors(loop_of(printed_choices.chapter_2("implied")), row["limit"], 0.0)["peak_percent"]
     assert abs(again - row["printed"]) <= row["tolerance"]
 
 
 def test_weights_that_are_the_usual_ones_give_the_usual_stabiliser() -> None:
-    design = thesis_designs.chapter_2("implied")
-    K, again = design.blocks["K"], unprinted_weights.with_weights(design, Weights()).blocks["K"]
+    design = printed_choices.chapter_2("implied")
+    K, again = design.blocks["K"], chapter_2_weights.with_weights(design, Weights()).blocks["K"]
     s = 1j * np.geomspace(0.1, 1e3, 20)
     np.testing.assert_allclose(again(s), K(s), rtol=1e-6)
-    other = unprinted_weights.with_weights(design, Weights(level=0.1)).blocks["K"]
+    other = chapter_2_weights.with_weights(design, Weights(level=0.1)).blocks["K"]
     assert np.abs(other(s) / K(s) - 1).max() > 0.1
     assert str(Weights(level=0.1)) == "level x 0.1"
     assert str(Weights()) == "usual"
@@ -317,10 +318,10 @@ def test_the_command_writes_both_tables(
     implied_exact: Conditions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small = Grid(np.array([1.1, 1.3]), np.array([1.002, 1.1]), np.array([0.9, 1.2]))
-    monkeypatch.setattr(unprinted_conditions, "usual_grid", lambda: small)
-    monkeypatch.setattr(unprinted_conditions, "every_condition", lambda: [implied_exact])
-    monkeypatch.setattr(unprinted_weights, "usual_limits", lambda: np.array([0.95, 0.99, 1.05]))
-    monkeypatch.setattr(unprinted_weights, "usual_weights", lambda: (Weights(),))
+    monkeypatch.setattr(search, "usual_grid", lambda: small)
+    monkeypatch.setattr(search, "every_condition", lambda: [implied_exact])
+    monkeypatch.setattr(chapter_2_weights, "usual_limits", lambda: np.array([0.95, 0.99, 1.05]))
+    monkeypatch.setattr(chapter_2_weights, "usual_weights", lambda: (Weights(),))
     result = CliRunner().invoke(main, ["conditions", "--output", str(tmp_path)])
     assert result.exit_code == 0, result.output
     table, summary = (pd.read_csv(tmp_path / f"{name}.csv") for name in ("conditions", "conditions_summary"))

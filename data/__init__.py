@@ -1,0 +1,1 @@
+"""What the project is run on: the thesis's printed numbers and synthetic sweeps."""

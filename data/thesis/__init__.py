@@ -1,0 +1,43 @@
+"""Thesis: what it prints: its numbers in thesis.toml, its statements in claims.csv, its equations in equations.csv."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from identification.model.model_file import IdentifiedModel, bound_from_dict, plant_from_dict, read_model
+
+THESIS = Path(__file__).resolve().parent
+
+
+@cache
+def printed() -> dict[str, Any]:
+    """Return data/thesis/thesis.toml as nested dictionaries; its comments give the units and the places in print.
+
+    Table 4.1 and what else the thesis chose, as printed.
+    """
+    return tomllib.loads((THESIS / "thesis.toml").read_text(encoding="utf-8"))
+
+
+def model_named(name: str) -> IdentifiedModel:
+    """Read a model.json, or give the thesis's own sets for the words ``table`` and ``implied``.
+
+    Both words come with the printed bound (2.22). ``table`` is Table 2.1 as printed; ``implied`` is the set
+    that gives back the transfer functions printed after it.
+
+    Raises
+    ------
+    InputError
+        See :func:`identification.model.model_file.read_model`.
+    """
+    plants = printed()["plants"]
+    if name not in plants:
+        return read_model(Path(name))
+    return IdentifiedModel(
+        plant=plant_from_dict(plants[name]),
+        additive_bound=bound_from_dict(printed()["additive_bound"]),
+        standard_errors=None,
+        fit={"source": f"thesis, parameter set '{name}'"},
+    )

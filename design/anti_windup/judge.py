@@ -1,0 +1,157 @@
+"""What (2.16)-(2.19) and Theorem 2.3.1 say of a theta1~, and the compensators that every design carries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from design.anti_windup.compensator import AntiWindup, second_order, uncertainty_cost
+from design.anti_windup.corrected_compensator import SETTLED, corrected
+from design.anti_windup.popov import popov_sector, robust_loss, robust_popov_sector
+from design.anti_windup.thesis_compensator import thesis_choice
+from design.blocks.block import Block, bound_block, fastest_root, plant_block
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import PlantModel
+
+SECTOR = 0.95  # of the corrected compensator unless another is stated: |u| may reach twenty times the limits
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What one theta1~ is worth for a plant and its W_a.
+
+    Parameters
+    ----------
+    f
+        ||W_a (1 + theta1~)||_inf, (2.19), which exceeds it by 1e-9 of it at most: proved.
+    f_omega
+        Frequency in rad/s where it is reached.
+    popov_sector
+        Sector k that Popov's condition is proved to allow, 1e-9 below the largest found; None: every one.
+    popov_multiplier_s
+        Of the Popov line, in seconds: through -1/k with the slope 1/multiplier; 0 is the circle criterion.
+    theta1_tilde_at_zero
+        theta1~(0); -1 is what removes a single integrator from theta2.
+    theta2_stable
+        Whether theta2 is stable, which the proof of Theorem 2.3.1 needs.
+    lasting_offset
+        What y_d keeps for ever after a windup, the integral of u - sat(u), of 1 (input unit times second), in the
+        output's unit; None when y_d grows without bound.
+    recovery_s
+        Time in seconds in which the slowest mode of theta1~ falls to 1 %; what is left of y_d then decays with the
+        plant's own modes.
+    """
+
+    f: float
+    f_omega: float
+    popov_sector: float | None
+    popov_multiplier_s: float
+    theta1_tilde_at_zero: float
+    theta2_stable: bool
+    lasting_offset: float | None
+    recovery_s: float
+
+
+def judge(model: IdentifiedModel, kind: AntiWindup) -> Judgement:
+    """Judge one anti-windup compensator for a plant and its bound."""
+    f, f_omega = uncertainty_cost(model.additive_bound, kind.one_plus)
+    sector, multiplier = popov_sector(kind.theta1_tilde)
+    slowest = min((-pole.real for pole in kind.one_plus.poles), default=np.inf)
+    return Judgement(
+        f=f,
+        f_omega=f_omega,
+        popov_sector=sector if np.isfinite(sector) else None,
+        popov_multiplier_s=multiplier,
+        theta1_tilde_at_zero=float(kind.theta1_tilde(0j).real),
+        theta2_stable=kind.theta2(model.plant).is_stable,
+        lasting_offset=lasting_offset(model.plant, kind),
+        recovery_s=float(np.log(1 / SETTLED)) / slowest,
+    )
+
+
+def lasting_offset(plant: PlantModel, kind: AntiWindup) -> float | None:
+    """The final value of y_d = theta2 u_tilde after a u_tilde of finite duration whose integral is 1.
+
+    lim s theta2(s) as s -> 0: the residue of theta2 at s = 0, K (1 + theta1~(0)) with one integrator; None when
+    theta2 has worse poles than one at s = 0.
+    """
+    theta2 = kind.theta2(plant)
+    if theta2.is_stable:
+        return 0.0
+    if theta2.unstable_poles != (0j,):
+        return None
+    return float((theta2 * Block(1.0, (0j,)))(0j).real)
+
+
+def robust_sector(
+    kind: AntiWindup, robustness: Callable[[np.ndarray], np.ndarray], roots: tuple[complex, ...]
+) -> float:
+    """The largest sector found for which Popov's condition holds for every plant within W_a, not for the model alone.
+
+    Parameters
+    ----------
+    kind
+        theta1~.
+    robustness
+        |W_a C S| as a function of omega in rad/s.
+    roots
+        Poles and zeros in rad/s that shape it.
+
+    Returns
+    -------
+    float
+        0 when |W_a C S| reaches 1: then not even the loop without saturation is stable for all these plants.
+    """
+    loss = robust_loss(kind.one_plus, robustness)
+    return robust_popov_sector(kind.theta1_tilde, loss, roots + kind.one_plus.zeros)[0]
+
+
+def compensators(
+    model: IdentifiedModel,
+    own_s: float,
+    recovery_s: float | None = None,
+    sector: float = SECTOR,
+    bandwidth: float | None = None,
+) -> dict[str, dict[str, Any]]:
+    """The ``anti_windup`` member of design.json: the thesis's and the corrected compensator, each with its judgement.
+
+    Parameters
+    ----------
+    model
+        Plant and W_a.
+    own_s
+        Time in seconds in which the design's own transients fall to 1 %.
+    recovery_s, sector
+        Of the corrected compensator, see :func:`design.anti_windup.corrected_compensator.corrected`. A recovery time
+        that is given is a bound; unless given, the slowest mode takes ``own_s``, to the lattice of the poles: one much
+        faster than the loop may have a smaller f, and answers a saturation with a control many times the limits.
+    bandwidth
+        Of the corrected compensator in rad/s; unless given, that of the fastest root of the plant and of W_a, which is
+        as far as the model says anything, and at least ten times the rate ln(100)/own_s. It does not depend on
+        ``recovery_s``, so that f does not increase with it.
+
+    Raises
+    ------
+    InputError
+        A number is out of its range, or no corrected compensator meets the sector.
+    """
+    bound = model.additive_bound
+    alpha, beta, gamma = thesis_choice(bound)
+    if bandwidth is None:
+        fastest = fastest_root(plant_block(model.plant), bound_block(bound))
+        bandwidth = max(fastest, 10 * float(np.log(1 / SETTLED)) / own_s)
+    unstable, pace = plant_block(model.plant).unstable_poles, own_s if recovery_s is None else recovery_s
+    found = corrected(unstable, bound, pace, sector, bandwidth, faster=recovery_s is not None)
+    return {
+        "thesis": {"alpha": alpha, "beta": beta, "gamma": gamma} | facts(model, second_order(alpha, beta, gamma)),
+        "corrected": {"sector": sector, "bandwidth": bandwidth, "f_lower": found.f_lower}
+        | facts(model, found.anti_windup),
+    }
+
+
+def facts(model: IdentifiedModel, kind: AntiWindup) -> dict[str, Any]:
+    """A compensator as design.json holds it: both blocks and what :func:`judge` says."""
+    return kind.to_dict() | asdict(judge(model, kind))

@@ -1,0 +1,131 @@
+"""The printed theta1~ (2.23) of least f: by the thesis's own procedure, and by a search over alpha, beta and gamma."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import minimize, minimize_scalar
+
+from design.anti_windup.compensator import second_order, uncertainty_cost
+from design.blocks.block import bound_block
+from design.blocks.frequency_peak import frequency_grid, searched_norm
+from identification.model.plant import AdditiveBound
+
+
+def optimal_gamma(bound: AdditiveBound, alpha: float, beta: float) -> tuple[float, float]:
+    """The gamma that minimises f(gamma) for given alpha and beta, to about 1e-8, and f there.
+
+    f is convex in gamma, being the largest of |W_a + gamma W_a h| over omega, so that a local minimum is the minimum;
+    gamma > -1 keeps the zeros of 1 + theta1~ in the open left half plane. The search takes norms from a refined grid;
+    the f that is returned is proved as :func:`design.anti_windup.compensator.uncertainty_cost` says.
+    """
+    W_a = bound_block(bound)
+
+    def cost(gamma: float) -> float:
+        return searched_norm(W_a * second_order(alpha, beta, gamma).one_plus)[0]
+
+    gamma, _ = _minimise(cost, _first_gamma(bound, alpha, beta), 1e-8)
+    return gamma, uncertainty_cost(bound, second_order(alpha, beta, gamma).one_plus)[0]
+
+
+def _first_gamma(bound: AdditiveBound, alpha: float, beta: float) -> float:
+    """Four times the gamma that puts the zeros of 1 + theta1~ at W_a's resonance: where to look first."""
+    return 4 * (1 + bound.resonance.omega**2 * alpha * beta)
+
+
+def _minimise(cost: Callable[[float], float], upper: float, tolerance: float) -> tuple[float, float]:
+    """The gamma > -1 that minimises a convex cost, and the minimum; ``upper`` grows until the minimum is inside."""
+    while True:
+        found = minimize_scalar(cost, bounds=(-1.0, upper), method="bounded", options={"xatol": tolerance * upper})
+        if found.x < 0.9 * upper:
+            return float(found.x), float(found.fun)
+        upper *= 4
+
+
+def thesis_choice(bound: AdditiveBound) -> tuple[float, float, float]:
+    """alpha, beta, gamma by the thesis's own procedure (section 2.4).
+
+    alpha = 1/corner removes the zero of W_a; beta is the best of 2 alpha, alpha, alpha/2, alpha/4 (printed:
+    1/10 ... 1/80, a coarse grid); gamma minimises f.
+    """
+    alpha = 1 / bound.corner
+    candidates = [(optimal_gamma(bound, alpha, beta), beta) for beta in beta_grid(alpha)]
+    (gamma, _), beta = min(candidates, key=lambda candidate: candidate[0][1])
+    return alpha, beta, gamma
+
+
+def beta_grid(alpha: float) -> tuple[float, ...]:
+    """The values of beta that our Fig. 2.10 compares, as multiples of alpha; the thesis does not name its own."""
+    return 2 * alpha, alpha, alpha / 2, alpha / 4
+
+
+def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float, float]:
+    """The least f found of (2.23) over alpha, beta and gamma together, no pole of theta1~ beyond a bandwidth.
+
+    Parameters
+    ----------
+    bound
+        W_a.
+    bandwidth
+        In rad/s; alpha and beta are at least 1/bandwidth.
+
+    Returns
+    -------
+    alpha, beta, gamma, f
+        alpha >= beta, in seconds.
+
+    Notes
+    -----
+    Without a bandwidth there is no optimum where W_a is strictly proper: with alpha, beta -> 0 and gamma -> -1 theta1~
+    tends to -1 at every frequency where W_a is not small, and f to 0.
+
+    For given alpha and beta f is convex in gamma, see :func:`optimal_gamma`. Over the two time constants it is
+    not, so that a grid from 1/bandwidth to a hundred times the period of W_a's resonance gives the starts. f is
+    minimised from the two best on fixed frequencies, and from what that gives on all. That no other alpha and beta are
+    better is not proved; f belongs to the three numbers that are returned, as
+    :func:`design.anti_windup.compensator.uncertainty_cost` says.
+    """
+    W_a = bound_block(bound)
+    omega = frequency_grid(W_a.zeros + W_a.poles, per_decade=30)
+    s, values = 1j * omega, W_a(1j * omega)
+    ends = 1 / bandwidth, max(100 / bound.resonance.omega, 100 / bandwidth)
+
+    def on_grid(alpha: float, beta: float, tolerance: float) -> float:
+        slope = values / ((1 + alpha * s) * (1 + beta * s))
+        first = _first_gamma(bound, alpha, beta)
+        return _minimise(lambda gamma: float(np.abs(values + gamma * slope).max()), first, tolerance)[1]
+
+    def rough(logarithms: np.ndarray) -> float:
+        alpha, beta = np.exp(logarithms)
+        return on_grid(float(alpha), float(beta), 1e-6)
+
+    def located(logarithms: np.ndarray) -> float:
+        alpha, beta = np.exp(logarithms)
+        return optimal_gamma(bound, float(alpha), float(beta))[1]
+
+    def polish(cost: Callable[[np.ndarray], float], start: np.ndarray, size: float, most: int) -> np.ndarray:
+        limits = [(float(np.log(ends[0])), float(np.log(ends[1])))] * 2
+        simplex = np.clip(start + size * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), *limits[0])
+
+        def logarithm(logarithms: np.ndarray) -> float:  # the unit of W_a does not count
+            return float(np.log(cost(logarithms)))
+
+        found = minimize(
+            logarithm,
+            start,
+            method="Nelder-Mead",
+            bounds=limits,
+            options={"maxfev": most, "initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-9},
+        )
+        return np.asarray(found.x)
+
+    constants = np.geomspace(*ends, 16)
+    starts = sorted(
+        (on_grid(alpha, beta, 1e-3), alpha, beta) for alpha in constants for beta in constants if beta <= alpha
+    )
+    found = [polish(rough, np.log(start[1:]), -0.1, 200) for start in starts[:2]]
+    best = polish(located, min(found, key=rough), -0.002, 40)
+    beta, alpha = sorted(float(constant) for constant in np.exp(best))
+    gamma, f = optimal_gamma(bound, alpha, beta)
+    return alpha, beta, gamma, f

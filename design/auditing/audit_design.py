@@ -1,0 +1,190 @@
+"""The audit of a design: stability with the exact dead time, margins, |W_a C S|, and every anti-windup it carries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from design.anti_windup.judge import Judgement, judge, robust_sector
+from design.anti_windup.thesis_compensator import least_f
+from design.blocks.block import Block, bound_block, fastest_root, geometric_scale, plant_block, plant_numerator
+from design.blocks.frequency_peak import frequency_grid
+from design.chapters_3_4.smith_predictor import anti_windup_controller, smith_controller, stabiliser
+from design.design_file import Design
+from design.hinf.mixed_sensitivity import Infimum, Synthesis, assess, infimum
+from design.stability.axis import HALVE, NO_ZERO, cells, first_edges
+from design.stability.characteristic_roots import CharacteristicRoots, largest_beyond, rightmost_roots
+from design.stability.jet import jet
+from design.stability.margins import Margins, delay_loop, margins_of, responses, tracking_floor
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel, number
+from identification.model.plant import AdditiveBound, PlantModel
+
+Result = TypeVar("Result")
+
+CERTAIN = 1e-9  # of a covered dead time, by which it is told too small
+ROOTS = 5  # rightmost characteristic roots that are named
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What can be said of a design before anything is simulated.
+
+    Parameters
+    ----------
+    roots
+        The rightmost characteristic roots of the nominal loop with its exact dead time, or why they were not found.
+    margins
+        Of the nominal loop, or the sentence that says why it has none.
+    with_delay
+        The same of a delay-free design on the plant with its dead time; None where that is the nominal loop.
+    tracking_floor
+        No controller that follows the reference has a smaller ||W_a C S||.
+    covered_delay_s
+        Every plant whose dead time differs from the nominal one by less than this, in seconds, lies within W_a.
+    same_controller
+        The largest |C_aw/C_s - 1| over a grid of frequencies, of an extended design with the exact inverse; else None.
+    stabiliser, infimum
+        What K reaches and the infimum of (2.8), of a delay-free design, or why they were not found; else None.
+    anti_windup
+        Name -> its judgement.
+    robust_sector
+        Name -> the largest sector for every plant within W_a; 0 when |W_a C S| reaches 1 or the loop is not stable.
+    least_f
+        alpha, beta, gamma and f of the best of the printed form (2.23) within the corrected one's bandwidth.
+    """
+
+    roots: CharacteristicRoots | str
+    margins: Margins | str
+    with_delay: Margins | str | None
+    tracking_floor: float
+    covered_delay_s: float
+    same_controller: float | None
+    stabiliser: Synthesis | str | None
+    infimum: Infimum | str | None
+    anti_windup: dict[str, Judgement]
+    robust_sector: dict[str, float]
+    least_f: tuple[float, float, float, float]
+
+
+def audit(design: Design) -> Audit:
+    """Audit a design; nothing is taken from the file but plant, W_a, blocks and the compensators themselves.
+
+    Raises
+    ------
+    InputError
+        The blocks do not belong to the plant.
+    """
+    _require_consistent(design)
+    plant, bound = design.loop_plant, design.additive_bound
+    model = IdentifiedModel(plant, bound, None, {})
+    forward, feedback = design.controller_parts()
+    loop = delay_loop(design, plant)
+    margins = _attempt(lambda: margins_of(loop, bound))
+    roots = _attempt(lambda: rightmost_roots(loop, ROOTS))
+    blocks = (loop.plant, forward, feedback, bound_block(bound))
+    shapes = tuple(root for block in blocks for root in block.zeros + block.poles)
+    if not isinstance(roots, str):
+        shapes += tuple(complex(root) for root in roots.roots)
+
+    def robustness(omega: np.ndarray) -> np.ndarray:
+        return np.asarray(np.abs(bound(1j * omega) * responses(loop, omega)[1]))
+
+    same = None
+    if design.kind == "extended" and not design.parameters.get("inverse_epsilon"):
+        s = 1j * frequency_grid(shapes, per_decade=20)
+        s = s[np.abs(s) > 1e-2 * number(design.parameters, "a")]  # below, both are differences that vanish
+        C_s = smith_controller(plant, design.blocks["C0"], s)
+        same = float(np.max(np.abs(anti_windup_controller(plant, forward, feedback, s) / C_s - 1)))
+    reached = interval = None
+    if design.hinf is not None:
+        G_A, K, W1, W2 = design.blocks["G_A"], design.blocks["K"], design.hinf["W1"], design.hinf["W2"]
+        decay_rate = number(design.hinf, "decay_rate")
+        reached = _attempt(lambda: assess(G_A, W1, W2, K, decay_rate))
+        interval = _attempt(lambda: infimum(G_A, W1, W2, decay_rate))
+    guaranteed = isinstance(margins, Margins) and margins.is_guaranteed
+    kinds = {name: design.compensator(name) for name in design.anti_windup}
+    sectors = {name: robust_sector(kind, robustness, shapes) if guaranteed else 0.0 for name, kind in kinds.items()}
+    delayed = None
+    if plant != design.plant:
+        delayed = _attempt(lambda: margins_of(delay_loop(design, design.plant), bound))
+    return Audit(
+        roots=roots,
+        margins=margins,
+        with_delay=delayed,
+        tracking_floor=tracking_floor(plant, bound, design.reference_omegas),
+        covered_delay_s=covered_delay(plant, bound),
+        same_controller=same,
+        stabiliser=reached,
+        infimum=interval,
+        anti_windup={name: judge(model, kind) for name, kind in kinds.items()},
+        robust_sector=sectors,
+        least_f=least_f(bound, number(design.anti_windup["corrected"], "bandwidth")),
+    )
+
+
+def _attempt(compute: Callable[[], Result]) -> Result | str:
+    """What was computed, or the sentence with which it was refused: the audit goes on without it."""
+    try:
+        return compute()
+    except InputError as error:
+        return str(error)
+
+
+def _require_consistent(design: Design) -> None:
+    """Refuse blocks that do not follow from the plant and from each other, (2.6) or (3.29)."""
+    plant, blocks = design.loop_plant, design.blocks
+    if design.kind == "delay-free":
+        expected, found = plant_numerator(plant) * blocks["Lambda"].inverse(), blocks["G_A"]
+    else:
+        epsilon = float(design.parameters.get("inverse_epsilon", 0.0))
+        expected, found = stabiliser(plant, blocks["T_so"], epsilon)[2], blocks["K"]
+    s = geometric_scale(expected) * np.array([0.1, 1.0 + 0.5j, 7.0])
+    if not np.allclose(found(s), expected(s), rtol=1e-6, atol=0.0):
+        raise InputError("the blocks do not belong to the plant; expected a design that 'python -m design' wrote")
+
+
+def covered_delay(plant: PlantModel, bound: AdditiveBound) -> float:
+    """The largest change of the dead time, in seconds, for which the plant stays within W_a; infinite if every one.
+
+    |P| |exp(-j omega tau) - 1| = 2 |P| |sin(omega tau/2)| <= |W_a| at every omega. 0 where 2 |P| stays above |W_a| as
+    omega grows, and beside two integrators. No change of an integrator's gain is covered by any W_a that is finite at
+    s = 0. With r = |W_a/P| the value is the least (2/omega) arcsin(r/2) where r < 2, less :data:`CERTAIN` of it. It is
+    bounded from below on cells of omega, which are halved while the bound leaves room for less.
+    """
+    P, W_a = plant_block(plant).without_delay(), bound_block(bound)
+    share = W_a * P.inverse()
+    if share.relative_degree > 0 or (share.relative_degree == 0 and abs(share.gain) < 2) or share.zeros.count(0) > 1:
+        return 0.0
+    top = 2 * fastest_root(share) if share.zeros + share.poles else 1.0
+    farthest = top / np.finfo(float).eps
+    while largest_beyond(share.inverse(), 0.0, top) > 0.5:
+        if top > farthest:
+            return 0.0  # |W_a| tends to 2 |P| and not from above, as far as rounding shows
+        top *= 2
+    over_s = share * Block(1.0, (), (0j,)) if 0 in share.zeros else share
+    best = np.inf
+
+    def judge(centre: np.ndarray, half: np.ndarray) -> np.ndarray:
+        nonlocal best
+        found = jet((over_s,), 0.0, centre, half)
+        if over_s is share:  # no integrator
+            least, here, at = found.least / (centre + half), np.abs(found.value) / centre, centre + half
+        else:
+            least, here, at = found.least, np.abs(found.value), centre - half
+        best = min(best, float(np.min(_shift(here, centre))))
+        return np.where(_shift(least, at) < (1 - CERTAIN) * best, HALVE, NO_ZERO)
+
+    cells(judge, first_edges(share.zeros + share.poles, top))
+    return float((1 - CERTAIN) * best)
+
+
+def _shift(ratio: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """(2/omega) arcsin(omega ratio/2), which grows with both; inf beyond the arcsine's range."""
+    x = omega * ratio / 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = np.where(x < 1, ratio * np.where(x > 0, np.arcsin(np.minimum(x, 1.0)) / x, 1.0), np.inf)
+    return np.asarray(found)

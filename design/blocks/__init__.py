@@ -1,0 +1,1 @@
+"""Tool: rational transfer functions with a dead time, their state spaces and norms."""

@@ -1,0 +1,1 @@
+"""Tool: the delay-free design of chapter 2."""

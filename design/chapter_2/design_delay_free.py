@@ -1,0 +1,134 @@
+"""The chapter 2 design: internal model, H-infinity stabiliser and anti-windup for the plant without its dead time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from design.anti_windup.compensator import printed_form
+from design.anti_windup.corrected_compensator import SETTLED
+from design.anti_windup.judge import SECTOR, compensators
+from design.blocks.block import Block, bound_block, plant_denominator, plant_numerator, require_thesis_class
+from design.chapter_2.internal_model import InternalModel, internal_model, reference_polynomial
+from design.design_file import Design
+from design.hinf.mixed_sensitivity import mixed_sensitivity
+from design.hinf.pick import Problem
+from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
+
+TRACKING = 0.01  # W1 asks for |S| below gamma times this at the reference's frequencies
+
+
+def stabiliser_problem(model: IdentifiedModel, period_s: float, epsilon: float) -> tuple[InternalModel, Problem]:
+    """The internal model units, and what the stabiliser K has to minimise.
+
+    Parameters
+    ----------
+    model, period_s, epsilon
+        As for :func:`design_delay_free`.
+
+    Raises
+    ------
+    InputError
+        As :func:`design_delay_free`.
+
+    Notes
+    -----
+    The thesis prints neither W1 nor W2, so their principle is ours, after Remark 1:
+
+    W2 = W_a/G, the multiplicative bound itself, so that ||W2 T|| < 1 is robust stability. Where deg Lambda
+    exceeds deg B it gets as many zeros, an octave above the fastest root, as make W2 G_A biproper.
+
+    W1 has the reference's poles, damped: moved left by twice the decay rate, which makes the stabiliser's
+    zeros there cancel, and W1(0) = 1/TRACKING. The decay rate leaves SETTLED of a transient after one period,
+    or is half that of the slowest mode of plant and bound where these decay more slowly.
+    """
+    if not (math.isfinite(period_s) and period_s > 0):
+        raise InputError(f"the period is {period_s:g} s; expected a positive number")
+    plant = model.plant.without_delay()
+    require_thesis_class(plant)
+    omega = 2 * math.pi / period_s
+    units = internal_model(plant, omega, epsilon)
+    A, B, W_a = plant_denominator(plant), plant_numerator(plant), bound_block(model.additive_bound)
+    slowest = min(-root.real for root in A.zeros + B.zeros + W_a.poles if root != 0)
+    decay_rate = min(math.log(1 / SETTLED) / period_s, slowest / 2)
+
+    fastest = max(abs(root) for root in A.zeros + B.zeros + W_a.poles + units.Lambda.zeros)
+    W2 = W_a * A * B.inverse()
+    missing = (W2 * units.G_A).relative_degree
+    W2 = W2 * Block((2 * fastest) ** -missing, (complex(-2 * fastest),) * missing)
+    damped = tuple(root - 2 * decay_rate for root in reference_polynomial(omega, epsilon).zeros)
+    W1 = Block(float(np.prod(np.abs(damped))) / TRACKING, (), damped)
+    return units, Problem(units.G_A, W1, W2, decay_rate)
+
+
+def design_delay_free(
+    model: IdentifiedModel,
+    period_s: float,
+    epsilon: float,
+    recovery_s: float | None = None,
+    sector: float = SECTOR,
+    bandwidth: float | None = None,
+) -> Design:
+    """Chapter 2: Lambda, F1, F2, G_A, the stabiliser K, theta1~, theta1 and theta2.
+
+    Parameters
+    ----------
+    model
+        Plant (its dead time is ignored, as the thesis does) and W_a.
+    period_s
+        Period of the sinusoidal reference in seconds.
+    epsilon
+        Of the factor s^2 + epsilon of Lambda, in rad^2/s^2.
+    recovery_s, sector, bandwidth
+        Of the corrected anti-windup, see :func:`design.anti_windup.judge.compensators`; unless given, the recovery
+        takes half as long as the loop's own transients at most.
+
+    Raises
+    ------
+    InputError
+        A number is out of its range, or the plant has more pole modes than zero modes, for which 1 + F and
+        W2 G_A lose the degrees that the construction needs.
+    SynthesisError
+        The synthesis failed its own check.
+
+    Notes
+    -----
+    C = K A/Lambda has a zero at the plant's pole s = 0 (A(0) = 0; Lemma 1 assumes a stable A): the integrator is
+    hidden from the loop and not stabilised, so that a constant disturbance at the plant's input makes y drift.
+    """
+    units, problem = stabiliser_problem(model, period_s, epsilon)
+    W1, W2, decay_rate = problem.W1, problem.W2, problem.decay_rate
+    synthesis = mixed_sensitivity(problem.G, W1, W2, decay_rate)
+    anti_windup = compensators(model, math.log(1 / SETTLED) / (2 * decay_rate), recovery_s, sector, bandwidth)
+    thesis = printed_form(anti_windup["thesis"])
+    return Design(
+        kind="delay-free",
+        plant=model.plant,
+        additive_bound=model.additive_bound,
+        reference_omegas=(2 * math.pi / period_s,),
+        blocks={
+            "Lambda": units.Lambda,
+            "F1": units.F1,
+            "F2": units.F2,
+            "G_A": units.G_A,
+            "K": synthesis.K,
+            "theta1_tilde": thesis.theta1_tilde,
+            "theta1": thesis.theta1_tilde * units.one_plus_F,  # Eq. (2.17)
+            "theta2": thesis.theta2(model.plant.without_delay()),  # Eq. (2.18)
+        },
+        hinf={
+            "gamma_lower": synthesis.gamma_lower,
+            "reason": synthesis.reason,
+            "gamma": synthesis.gamma,
+            "decay_rate": decay_rate,
+            "gamma_line_lower": synthesis.gamma_line_lower,
+            "line_reason": synthesis.line_reason,
+            "gamma_line": synthesis.gamma_line,
+            "W1": W1,
+            "W2": W2,
+        },
+        anti_windup=anti_windup,
+        parameters={"period_s": period_s, "epsilon": epsilon},
+    )

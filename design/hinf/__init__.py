@@ -1,0 +1,1 @@
+"""Tool: the H-infinity problem of mixed sensitivity, solved by Nevanlinna-Pick interpolation."""

@@ -1,0 +1,235 @@
+"""The mixed sensitivity problem as an interpolation problem of Nevanlinna and Pick, decided in ball arithmetic."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+from flint import acb, arb, arb_poly, ctx
+
+from design.blocks.ball import (
+    Line,
+    decided,
+    from_roots,
+    line,
+    negative_pivot,
+    number,
+    polynomial_roots,
+    right_half_plane_roots,
+    shared,
+    squared,
+)
+from design.blocks.block import Block
+from identification.base.errors import InputError
+
+
+class SynthesisError(InputError):
+    """The synthesis found no controller, or one that its own closed loop does not confirm."""
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """No stabilising controller brings the norm to ``gamma`` or below, and in ``reason`` why."""
+
+    gamma: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Problem:
+    """|| [W1 S; W2 T] || over Re s > -decay_rate, see :func:`design.hinf.mixed_sensitivity.mixed_sensitivity`.
+
+    Notes
+    -----
+    With W1 = n_c n_1/(d_c d_1) and W2 = n_c n_2/(d_c d_2), n_c and d_c what they share, p~(s) = p(-s) and
+    N = n_1 n_1~ d_2 d_2~ + n_2 n_2~ d_1 d_1~, the norm is at most gamma where on the axis, S being 1 - T,
+
+        |N T - n_1 n_1~ d_2 d_2~|^2 |n_c|^2 <= |d_1 d_2 nu|^2,   nu nu~ = gamma^2 d_c d_c~ N - n_c n_c~ |n_1 n_2|^2,
+
+    all polynomials without roots in the right half plane but N and what has a ~. So
+
+        E = (N T - n_1 n_1~ d_2 d_2~) n_c/(d_1 d_2 nu)
+
+    is stable with the norm 1 at most. A stable function E belongs to a T that a stabilising controller makes where
+    T = 1 at the unstable poles of G, T = 0 at its unstable zeros, and N T = 0 at the right half plane's roots of N:
+
+        E = n_c n_2 n_2~ d_1~/(d_2 nu) at the poles,   E = -n_c n_1 n_1~ d_2~/(d_1 nu) at the zeros and the roots.
+
+    By Pick's theorem there is one if and only if the matrix (1 - e_k conj(e_l))/(s_k + conj(s_l)) of the points s_k
+    and values e_k is not indefinite (J. B. Garnett, Bounded Analytic Functions, Academic Press 1981, chapter I). Below
+    a gamma at which nu nu~ is negative somewhere on the axis there is none whatever the plant.
+    """
+
+    G: Block
+    W1: Block
+    W2: Block
+    decay_rate: float
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The polynomials of :class:`Problem` in x, squares of moduli as polynomials in x^2, and where E is known."""
+
+    line: Line
+    d1: arb_poly
+    d2: arb_poly
+    nc: arb_poly
+    n1_squared: arb_poly
+    n2_squared: arb_poly
+    dc_squared: arb_poly
+    N: arb_poly
+    poles: tuple[acb, ...]
+    zeros: tuple[acb, ...]
+    roots: tuple[acb, ...]
+
+    @property
+    def points(self) -> tuple[acb, ...]:
+        """All points of the right half plane where E is known."""
+        return self.poles + self.zeros + self.roots
+
+
+@lru_cache(maxsize=16)
+def setting_of(problem: Problem, bits: int) -> Setting:
+    """The setting at a precision of ``bits``, which is that of the context."""
+    x = line(problem.decay_rate, problem.G, problem.W1, problem.W2)
+    nc, n1, n2 = shared(problem.W1.zeros, problem.W2.zeros)
+    dc, d1, d2 = shared(problem.W1.poles, problem.W2.poles)
+    n1_squared = x.gain(problem.W1) ** 2 * squared(x.hurwitz(n1))
+    n2_squared = x.gain(problem.W2) ** 2 * squared(x.hurwitz(n2))
+    N = n1_squared * squared(x.hurwitz(d2)) + n2_squared * squared(x.hurwitz(d1))
+    poles, zeros = (
+        tuple(both for root in x.points(roots) if root.real > 0 for both in _pair(root))
+        for roots in (problem.G.poles, problem.G.zeros)
+    )
+    roots = tuple(right_half_plane_roots(N))
+    return Setting(
+        x,
+        x.hurwitz(d1),
+        x.hurwitz(d2),
+        x.hurwitz(nc),
+        n1_squared,
+        n2_squared,
+        squared(x.hurwitz(dc)),
+        N,
+        poles,
+        zeros,
+        roots,
+    )
+
+
+def _pair(root: acb) -> tuple[acb, ...]:
+    return (root,) if root.imag == 0 else (root, root.conjugate())
+
+
+def is_feasible(problem: Problem, gamma: float) -> Obstacle | bool:
+    """Whether a stabilising controller brings the norm below gamma: True, the proof that none does, or False.
+
+    Parameters
+    ----------
+    problem
+        What is minimised.
+    gamma
+        Bound on the norm, positive.
+
+    Returns
+    -------
+    Obstacle or bool
+        False where the highest precision decides nothing. The obstacle's gamma is the given one or a greater one.
+    """
+    answer = decided(lambda: _judge(setting_of(problem, ctx.prec), problem, gamma))
+    return False if answer is None else answer
+
+
+def _judge(setting: Setting, problem: Problem, gamma: float) -> Obstacle | bool:
+    level = level_of(setting, gamma)
+    obstacle = _single_point(setting, problem, gamma, level)
+    if obstacle is not None:
+        return obstacle
+    points = setting.points
+    pivot = negative_pivot(pick_matrix(points, values_of(setting, nu_of(level))))
+    if pivot is None:
+        return True
+    return Obstacle(
+        gamma,
+        f"no stable T meets its {len(points)} conditions: Pick's matrix has a pivot of {pivot:.3g} times its diagonal",
+    )
+
+
+def _single_point(setting: Setting, problem: Problem, gamma: float, level: arb_poly) -> Obstacle | None:
+    """What S and T cost at one point of the closed half plane, where that is more than gamma."""
+    top = level.degree()
+    if (-1) ** top * level[top] < 0:
+        constant = level_of(setting, 0.0)[top] / (level - level_of(setting, 0.0))[top] * -(arb(gamma) ** 2)
+        return _costs(constant.sqrt(), "S + T = 1 at infinite frequency")
+    crossings = sorted(float((-root.real).sqrt()) for root in polynomial_roots(level) if root.imag == 0 > root.real)
+    if crossings:  # simple roots: the level is negative between two of them, or before the first
+        omegas = [
+            setting.line.unit * omega
+            for omega in (crossings[0] / 2, *(math.sqrt(low * high) for low, high in pairwise(crossings)))
+        ]
+        moduli = [
+            tuple(_modulus(weight, complex(-problem.decay_rate, omega)) for weight in (problem.W1, problem.W2))
+            for omega in omegas
+        ]
+        costs = [first * second / (first**2 + second**2).sqrt() for first, second in moduli]
+        cost, omega = max(zip(costs, omegas, strict=True), key=lambda pair: float(pair[0]))
+        if cost > gamma:
+            return _costs(cost, f"S + T = 1 at {omega:.4g} rad/s")
+    for weight, roots, said in (
+        (problem.W2, problem.G.poles, "T = 1 at the pole"),
+        (problem.W1, problem.G.zeros, "S = 1 at the zero"),
+    ):
+        for root in roots:
+            if number(root).real + arb(problem.decay_rate) >= 0 and (cost := _modulus(weight, root)) > gamma:
+                return _costs(cost, f"{said} {root if root.imag else root.real:.4g} of G")
+    return None
+
+
+def _costs(cost: arb, said: str) -> Obstacle:
+    return Obstacle(math.nextafter(float(cost.lower()), 0.0), f"{said} costs {float(cost):.6g}")
+
+
+def level_of(setting: Setting, gamma: float) -> arb_poly:
+    """nu nu~ as a polynomial in x^2."""
+    return arb(gamma) ** 2 * setting.dc_squared * setting.N - (
+        squared(setting.nc) * setting.n1_squared * setting.n2_squared
+    )
+
+
+def _modulus(weight: Block, s: complex) -> arb:
+    """|weight(s)|."""
+    value = acb(weight.gain)
+    for root in weight.zeros:
+        value *= number(s) - number(root)
+    for root in weight.poles:
+        value /= number(s) - number(root)
+    return abs(value)
+
+
+def nu_of(level: arb_poly) -> arb_poly:
+    """The polynomial nu without roots in the right half plane."""
+    roots = [acb(-root.real, root.imag) for root in right_half_plane_roots(level) if not root.imag < 0]
+    return abs(level[level.degree()]).sqrt() * from_roots(roots)
+
+
+def values_of(setting: Setting, nu: arb_poly) -> list[acb]:
+    """E at the points."""
+    values = []
+    for k, s in enumerate(setting.points):
+        if k < len(setting.poles):
+            own, other, squares = setting.d2, setting.d1, setting.n2_squared
+        else:
+            own, other, squares = setting.d1, setting.d2, -setting.n1_squared
+        values.append(setting.nc(s) * squares(s * s) * other(-s) / (own(s) * nu(s)))
+    return values
+
+
+def pick_matrix(points: Sequence[acb], values: Sequence[acb]) -> list[list[acb]]:
+    """(1 - e_k conj(e_l))/(s_k + conj(s_l)), shape (n, n), of points and values (n,)."""
+    return [
+        [(1 - e * f.conjugate()) / (s + t.conjugate()) for t, f in zip(points, values, strict=True)]
+        for s, e in zip(points, values, strict=True)
+    ]

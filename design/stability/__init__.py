@@ -1,0 +1,1 @@
+"""Tool: loops with a dead time: characteristic roots, margins, stable intervals."""

@@ -1,0 +1,1 @@
+"""Tool: random plants within the bound W_a, each simulated."""

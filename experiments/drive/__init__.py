@@ -1,0 +1,1 @@
+"""Tool: the same controller on a computer with a sampled, quantised, slewing actuator."""

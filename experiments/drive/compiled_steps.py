@@ -1,0 +1,146 @@
+"""The compiled steps of a sampled loop: the computer's equations, the actuator, the plant by series."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+MOST = 1e100  # times the limits, or without limits of a state: beyond it a loop diverges
+ENORMOUS = 1e250  # a state with which no run goes on, whatever the limits
+NEGLIGIBLE = 1e-17  # of the last term of a series, relative to the largest state
+
+
+@njit(cache=True, nogil=True)
+def _dot(a: Array, b: Array) -> float:
+    value = 0.0
+    for i in range(len(a)):
+        value += a[i] * b[i]
+    return value
+
+
+@njit(cache=True, nogil=True)
+def _row(A: Array, i: int, x: Array) -> float:
+    """Row i of A times x."""
+    value = 0.0
+    for j in range(A.shape[1]):
+        value += A[i, j] * x[j]
+    return value
+
+
+@njit(cache=True, nogil=True)
+def _step(A: Array, b: Array, x: Array, following: Array, given: float, most: float) -> bool:
+    """Replace x by A x + b given; whether all of it stays below ``most``. ``following`` is room for it."""
+    small = True
+    for i in range(len(x)):
+        following[i] = _row(A, i, x) + b[i] * given
+        small = small and abs(following[i]) < most
+    for i in range(len(x)):
+        x[i] = following[i]
+    return small
+
+
+@njit(cache=True, nogil=True)
+def _carry(
+    A: Array, b: Array, norm: float, x: Array, term: Array, following: Array, level: float, slope: float, length: float
+) -> None:
+    """Carry x' = A x + b (level + slope t) over a length of time by its Taylor series, of which two terms need room."""
+    if length <= 0:
+        return
+    pieces = max(1, int(np.ceil(norm * length)))
+    step = length / pieces
+    for _ in range(pieces):
+        for j in range(len(x)):
+            term[j] = x[j]
+        i, size = 0, 1.0
+        while size > NEGLIGIBLE:  # at most 19 terms: norm * step <= 1
+            given = level if i == 0 else (slope * step if i == 1 else 0.0)
+            i += 1
+            factor = step / i
+            for j in range(len(x)):
+                following[j] = factor * (_row(A, j, term) + b[j] * given)
+            for j in range(len(x)):
+                term[j] = following[j]
+                x[j] += following[j]
+            size *= norm * factor
+        level += slope * step
+
+
+@njit(cache=True, nogil=True)
+def _move(
+    A: Array, b: Array, norm: float, x: Array, term: Array, following: Array,
+    start: float, command: float, slew: float, since: float, until: float,
+) -> None:  # fmt: skip
+    """Carry the plant from ``since`` to ``until``, seconds after the actuator left ``start`` for ``command``."""
+    arrival = abs(command - start) / slew
+    if since < arrival:
+        slope = slew if command > start else -slew
+        _carry(A, b, norm, x, term, following, start + slope * since, slope, min(arrival, until) - since)
+    _carry(A, b, norm, x, term, following, command, 0.0, until - max(arrival, since))
+
+
+@njit(cache=True, nogil=True)
+def run(
+    A_K: Array, b_K: Array, c_K: Array, d_K: float, A_T: Array, b_T: Array, c_T: Array, d_T: float,
+    A_w: Array, b_w: Array, C_w: Array, d_w: Array, whole: int, now: float, before: float,
+    A: Array, b: Array, c: Array, norm: float, late: int, read: float, T: float,
+    low: float, high: float, quantum: float, lowest: float, highest: float, slew: float, r: Array,
+) -> tuple[Array, Array, Array, Array, int]:  # fmt: skip
+    """y, u, commands, the actuator's place as each command is issued (s,), and how many samples were reached.
+
+    A command issued at t_k moves the plant on [t_k, t_k + T) of its own, late time, whose state ``read`` seconds into
+    that interval is sampled ``late`` + 1 samples after t_k.
+    """
+    s = len(r)
+    y, u, command, start = np.zeros(s), np.zeros(s), np.zeros(s), np.zeros(s)
+    p_T, p_w = np.zeros(s), np.zeros(s)  # T_so v and theta2 u_tilde before their dead time
+    x, x_K, x_T, x_w = np.zeros(len(b)), np.zeros(len(b_K)), np.zeros(len(b_T)), np.zeros(len(b_w))
+    term, following = np.empty(len(b)), np.empty(max(len(b), len(b_K), len(b_T), len(b_w)))
+    at_once = now if whole == 0 else 0.0
+    around, direct = at_once * d_T, at_once * d_w[1]
+    through = d_K * direct / (1 - around)  # u_tilde -> y_d -> v
+    limit = max(abs(low) if np.isfinite(low) else 0.0, abs(high) if np.isfinite(high) else 0.0)
+    most_u, most_x = (MOST * limit, ENORMOUS) if limit > 0 else (MOST, MOST)
+    place = min(max(0.0, low), high)
+    if quantum > 0:
+        place = quantum * min(max(np.rint(place / quantum), lowest), highest)
+    for k in range(s):
+        p_T[k], p_w[k] = _dot(c_T, x_T), _row(C_w, 1, x_w)
+        fed, y_d = 0.0, 0.0
+        if k >= whole:
+            fed, y_d = now * p_T[k - whole], now * p_w[k - whole]
+        if k > whole:
+            fed += before * p_T[k - whole - 1]
+            y_d += before * p_w[k - whole - 1]
+        e = r[k] - y[k] - y_d
+        v = (_dot(c_K, x_K) + d_K * e + fed) / (1 - around)
+        u_0 = v - _row(C_w, 0, x_w)
+        u_tilde = (u_0 - min(max(u_0, low), high)) / (1 + d_w[0] + through)
+        v -= through * u_tilde
+        e -= direct * u_tilde
+        u[k] = u_0 - (d_w[0] + through) * u_tilde
+        p_T[k] += d_T * v
+        p_w[k] += d_w[1] * u_tilde
+        command[k] = min(max(u[k], low), high)
+        if quantum > 0:
+            command[k] = quantum * min(max(np.rint(command[k] / quantum), lowest), highest)
+
+        start[k] = place
+        _move(A, b, norm, x, term, following, place, command[k], slew, 0.0, read)
+        if k + late + 1 < s:
+            y[k + late + 1] = _dot(c, x)
+        _move(A, b, norm, x, term, following, place, command[k], slew, read, T)
+        way = command[k] - place
+        place = command[k] if abs(way) <= slew * T else place + np.sign(way) * slew * T
+        small = _step(A_K, b_K, x_K, following, e, most_x)
+        small = _step(A_T, b_T, x_T, following, v, most_x) and small
+        small = _step(A_w, b_w, x_w, following, u_tilde, most_x) and small
+        for i in range(len(x)):
+            small = small and abs(x[i]) < most_x
+        if not (small and abs(u[k]) < most_u):
+            return y, u, command, start, k
+    return y, u, command, start, s

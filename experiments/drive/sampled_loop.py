@@ -1,0 +1,241 @@
+"""The loop of Fig. 2.6 with a computer as its controller and a real actuator: sampled, rounded, late and slow."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.anti_windup.compensator import AntiWindup
+from design.blocks.block import Block, plant_block
+from design.blocks.state_space import realize
+from design.design_file import Design
+from experiments.drive.compiled_steps import run
+from experiments.drive.difference_equations import METHODS, SampledBlock, sample_block, split
+from experiments.engine.simulate import MOST_STEPS, DivergenceError
+from experiments.runs.references import Reference, SampledReference
+from identification.base.errors import InputError
+from identification.model.plant import PlantModel
+
+MOST_LEVELS = 2.0**53  # which are still whole numbers
+SPARE = 1e-12  # relative: the quotient of two decimals may come out a rounding below a whole number
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The computer and the actuator between the controller's equations and the plant.
+
+    Parameters
+    ----------
+    rate_hz
+        1/T_s, samples a second.
+    method
+        How each block of the controller is discretised, ``tustin`` or ``exact``, see
+        :func:`experiments.drive.difference_equations.sample_block`.
+    limits
+        (sigma_1, sigma_2) of the saturation, sigma_1 < sigma_2, either may be infinite.
+    quantum
+        Distance of the actuator's levels, whole multiples of it within the limits; 0 is none.
+    slew
+        The most that the actuator's output changes in a second; inf is no limit.
+    input_delay_s
+        From the sampling instant to the actuator's answer: computation and transport.
+    """
+
+    rate_hz: float
+    method: str
+    limits: tuple[float, float]
+    quantum: float = 0.0
+    slew: float = math.inf
+    input_delay_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        low, high = self.limits
+        if not 0 < self.rate_hz < math.inf:
+            raise InputError(f"the rate is {self.rate_hz:g} Hz; expected a positive number")
+        if self.method not in METHODS:
+            raise InputError(f"the method is '{self.method}'; expected {' or '.join(METHODS)}")
+        if not low < high:
+            raise InputError(f"the saturation limits are {low:g} and {high:g}; expected the lower one first")
+        if not 0 <= self.quantum < math.inf:
+            raise InputError(f"the quantum is {self.quantum:g}; expected a number that is not negative, 0 for none")
+        if not self.slew > 0:
+            raise InputError(f"the slew is {self.slew:g} a second; expected a positive number, inf for no limit")
+        if not 0 <= self.input_delay_s < math.inf:
+            raise InputError(f"the input delay is {self.input_delay_s:g} s; expected a number that is not negative")
+        largest = max((abs(end) for end in self.limits if math.isfinite(end)), default=0.0)
+        if self.quantum > 0 and largest / self.quantum > MOST_LEVELS:
+            raise InputError(f"the quantum is {self.quantum:g}; expected 0, or no less than the limits over 2^53")
+        lowest, highest = self.levels
+        if lowest > highest:
+            raise InputError(f"no multiple of the quantum {self.quantum:g} lies within {low:g} and {high:g}")
+
+    @property
+    def levels(self) -> tuple[float, float]:
+        """The lowest and the highest level, in quanta; both infinite without a quantum."""
+        if self.quantum == 0:
+            return -math.inf, math.inf
+        low, high = (end / self.quantum for end in self.limits)
+        return float(np.ceil(low - SPARE * abs(low))), float(np.floor(high + SPARE * abs(high)))
+
+
+@dataclass(frozen=True)
+class SampledRun:
+    """A run at the sampling instants t_k = k T_s.
+
+    Parameters
+    ----------
+    time_s, reference, output, error
+        t_k, r, y and r - y, shape (s,).
+    control
+        u, which the computer finds from these samples and holds, before saturation, shape (s,).
+    saturated_control
+        What the actuator gives out at t_k (just after it, where it jumps): u saturated, rounded, late and slewing.
+    """
+
+    time_s: np.ndarray
+    reference: np.ndarray
+    output: np.ndarray
+    error: np.ndarray
+    control: np.ndarray
+    saturated_control: np.ndarray
+
+
+def instants(rate_hz: float, until_s: float) -> np.ndarray:
+    """The sampling instants from 0 to ``until_s``."""
+    return np.arange(int(until_s * rate_hz * (1 + SPARE)) + 1) / rate_hz
+
+
+def simulate_sampled(
+    design: Design,
+    reference: Reference | SampledReference,
+    anti_windup: AntiWindup | None,
+    drive: Drive,
+    until_s: float,
+    plant: PlantModel | None = None,
+) -> SampledRun:
+    """Run a design from rest with its controller on a computer.
+
+    Parameters
+    ----------
+    design, reference, anti_windup, plant
+        As :func:`experiments.runs.design_loop.design_loop` takes them; the controller keeps the design's model.
+    drive
+        The computer and the actuator.
+    until_s
+        Length of the run in seconds, one sample at least.
+
+    Raises
+    ------
+    InputError
+        The run is shorter than a sample or has too many steps, the true plant has no pole more than zeros, or the
+        rate is too low for the controller's equations to have one solution.
+    DivergenceError
+        The loop diverges.
+
+    Notes
+    -----
+    At t_k the computer samples r and y, no filter before it, and solves the equations of
+    :func:`experiments.runs.design_loop.design_loop` with each block replaced by its difference equation. It knows the
+    limits, but neither the rounding nor the slewing: u_tilde = u - sat(u). By Tustin's rule theta1~ has a direct part
+    (and so has theta2 where its dead time is below one sample), so that
+
+        u = u_0 - d (u - sat(u)),   that is   u - sat(u) = (u_0 - sat(u_0))/(1 + d),
+
+    the one solution while 1 + d > 0. The actuator's output goes from where it is toward the latest command in a
+    straight line, then stands. The plant's state is carried exactly, by series, from end to end of these lines; its
+    dead time and the input delay only say which of its states is sampled.
+    """
+    samples = until_s * drive.rate_hz
+    if not 1 - SPARE <= samples < math.inf:
+        raise InputError(
+            f"the run lasts {until_s:g} s; expected a finite time of one sample, {1 / drive.rate_hz:g} s, at least"
+        )
+    model = design.loop_plant
+    plant = model if plant is None else plant
+    if plant.relative_degree < 1:
+        raise InputError("the true plant has as many zeros as poles; expected more poles, or the loop is algebraic")
+    T = 1 / drive.rate_hz
+    P = realize(plant_block(plant))
+    norm = float(np.abs(np.column_stack([P.A, P.b])).sum(axis=1).max())  # of one second
+    if samples * math.ceil(norm * T) > MOST_STEPS:
+        raise InputError(
+            f"the run needs {samples * math.ceil(norm * T):.3g} steps, set by its rate and the plant's fastest pole; "
+            f"expected at most {MOST_STEPS:.3g} (a shorter run)"
+        )
+    forward, feedback, theta = _controller(design, anti_windup, T, drive.method)
+    _require_one_solution(forward, feedback, theta, drive.rate_hz)
+    time_s = instants(drive.rate_hz, until_s)
+    r = reference(time_s)
+    whole, rest = split(min(drive.input_delay_s + plant.delay_s, until_s + 2 * T), T)  # beyond the run is beyond
+    low, high = drive.limits
+    y, u, command, start, reached = run(
+        forward.A,
+        forward.b,
+        forward.C[0],
+        forward.d[0],
+        feedback.A,
+        feedback.b,
+        feedback.C[0],
+        feedback.d[0],
+        theta.A,
+        theta.b,
+        theta.C,
+        theta.d,
+        feedback.whole[0],
+        feedback.now[0],
+        feedback.before[0],
+        P.A,
+        P.b,
+        P.C[0],
+        norm,
+        whole,
+        (1 - rest) * T,
+        T,
+        float(low),
+        float(high),
+        drive.quantum,
+        *drive.levels,
+        drive.slew,
+        r,
+    )
+    if reached < len(r):
+        raise DivergenceError(float(time_s[reached]))
+    return SampledRun(time_s, r, y, r - y, u, _actuator(drive, command, start))
+
+
+def _controller(
+    design: Design, anti_windup: AntiWindup | None, sample_time_s: float, method: str
+) -> tuple[SampledBlock, SampledBlock, SampledBlock]:
+    """K/(1 + F) or K; T_so behind the model's dead time; theta1~, and theta2 behind that dead time."""
+    delay_s = design.loop_plant.delay_s
+    forward, feedback = design.controller_parts()
+    theta = (Block(0.0), Block(0.0))
+    if anti_windup is not None:
+        theta = (anti_windup.theta1_tilde, anti_windup.theta2(design.loop_plant))
+    return (
+        sample_block(realize(forward), [0.0], sample_time_s, method),
+        sample_block(realize(feedback), [delay_s], sample_time_s, method),
+        sample_block(realize(*theta), [0.0, delay_s], sample_time_s, method),
+    )
+
+
+def _require_one_solution(forward: SampledBlock, feedback: SampledBlock, theta: SampledBlock, rate_hz: float) -> None:
+    around = feedback.now[0] * feedback.d[0] if feedback.whole[0] == 0 else 0.0
+    later = theta.now[1] * theta.d[1] if theta.whole[1] == 0 else 0.0
+    if not (around < 1 and 1 + theta.d[0] + forward.d[0] * later / (1 - around) > 0):
+        raise InputError(
+            f"at {rate_hz:g} Hz Tustin's rule leaves the controller an algebraic loop without one solution; expected a "
+            "higher rate, or the method exact"
+        )
+
+
+def _actuator(drive: Drive, command: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """The actuator's output at the sampling instants from the commands (s,) and where it stands as each is issued."""
+    whole, rest = split(min(drive.input_delay_s, (len(command) + 2) / drive.rate_hz), 1 / drive.rate_hz)
+    late, since = (whole + 1, (1 - rest) / drive.rate_hz) if rest else (whole, 0.0)
+    reach = drive.slew * since if math.isfinite(drive.slew) else math.inf
+    moved = start + np.clip(command - start, -reach, reach)
+    before = np.full(min(late, len(moved)), start[0])
+    return np.concatenate([before, moved[: len(moved) - len(before)]])

@@ -1,0 +1,1 @@
+"""Tool: a saturated loop with dead times -> its exact response."""

@@ -1,0 +1,299 @@
+"""The integrator of saturated loops with dead times: Taylor series between events, compiled with numba.
+
+    x'(t) = A x + B m + D w        u = C x + E w        m = sat(u)        w_j(t) = Z_j x(t - h_j)
+
+Between events the loop is linear, so that on a step every signal is a polynomial in tau = (t - t_k)/step up to
+rounding, the delayed signals w being earlier polynomials shifted. A whole step is one product with a table, see
+:mod:`experiments.engine.step_table`; a step that a mesh point or an event cuts short is summed term by term.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from experiments.engine.crossings import leave
+from experiments.engine.kinks import gap, insert, shift
+from experiments.engine.signals import change, expand, fill, unfold
+from experiments.engine.step_table import NEGLIGIBLE, NOTHING, Rows, Tables, advance, dot, times, whole_lanes
+
+Array = NDArray[Any]
+
+BEYOND = 0.5  # of a step: how far beyond its end, where no kink is, the polynomial of a cut step is read
+TRIALS = 30  # in which what brief dead times change settles,
+SETTLED = 4.0  # of what is negligible, when it moves by no more than that
+DIVERGENT = 1e100  # times the limits, or without limits of a state: beyond it a loop diverges
+ENORMOUS = 1e250  # a state with which no run goes on, whatever the limits
+
+COMPLETE, DIVERGED, ENDLESS, CROWDED, EVENTFUL, UNSETTLED = 0, 1, 2, 3, 4, 5
+
+
+@njit(cache=True, nogil=True)
+def integrate(
+    unsaturated: Rows, saturated: Rows, tables: Tables, delays: Array, brief: Array, x0: Array,
+    reset_times: Array, resets: Array, low: float, high: float, horizon: float, step: float, samples: Array,
+    groups: Array, most_steps: int, most_events: int, room: int,
+) -> tuple[Array, Array, Array, int, float, int, float]:  # fmt: skip
+    """Integrate one loop from rest of its delayed signals, w_j(t < 0) = Z_j x0.
+
+    Parameters
+    ----------
+    unsaturated
+        Over (x (n,), m, w (k,)): n rows [A + B C, 0, D + B E], the loop without saturation, a row [C 0 E], k rows
+        [Z 0 0], and o rows [. 0 0] of what is watched.
+    saturated
+        The same with n rows [A B D].
+    tables
+        Of the two, see :class:`experiments.engine.step_table.Tables`, for the signals u, Z x and what is watched.
+    delays, brief, x0
+        Shapes (k,), (k,), (n,); delays positive. Where ``brief``, the loop is that with a dead time of zero, and w_j
+        stands for what the dead time changes, Z_j x(t - h_j) - Z_j x(t).
+    reset_times, resets
+        Shapes (b,), (b, g): times at which the first g states take given values.
+    low, high
+        Saturation limits, may be infinite.
+    horizon, step
+        End time and the tables' step in seconds, not more than any dead time that is not brief.
+    samples, groups
+        Shapes (g, s), (g + 1,): groups[i] ... groups[i + 1] - 1 of what is watched is sampled at the sorted times
+        samples[i] <= horizon; before zero it is as at zero. u is sampled with the first group.
+    most_steps, most_events, room
+        Where to give up; ``room``, a power of two, is for the steps and mesh points that a dead time remembers.
+
+    Returns
+    -------
+    values (1 + o, s), events (e,), modes (e,), status, end, steps, tail
+        u and what is watched at the samples; event times with the mode entered (-1, 0, 1); COMPLETE, DIVERGED,
+        ENDLESS (too many steps), CROWDED (too little room), EVENTFUL or UNSETTLED (a brief dead time is too long);
+        the time reached; the number of steps; the largest last term of a signal's polynomial, as a share of the
+        largest that the signal was.
+    """
+    n, k = len(x0), len(delays)
+    limit = max(abs(low) if np.isfinite(low) else 0.0, abs(high) if np.isfinite(high) else 0.0)
+    most_u, most_x = (DIVERGENT * limit, ENORMOUS) if limit > 0 else (np.inf, DIVERGENT)
+    increments, polynomials = tables.increments, tables.polynomials
+    indptr, indices, data = unsaturated
+    signals = len(indptr) - 1 - n
+    most = polynomials.shape[1] // signals - 1
+    values, sample = np.zeros((signals - k, samples.shape[1])), np.zeros(len(samples), np.int64)
+    events, modes, event_count = np.empty(most_events), np.empty(most_events, np.int64), 0
+
+    # the sources of the delayed signals, one polynomial a step, the step p at p % room, and where each dead time reads
+    starts, lates, radii, degrees, pieces = np.empty(room), np.empty(room), np.empty(room), np.empty(room, np.int64), 0
+    history = np.empty((room, k, most + 1))
+    wrap = room - 1
+    cursor, filled = np.zeros(k, np.int64), np.zeros(k, np.int64)
+    queue, queued = np.empty(room), 0  # mesh points to come: the images of kinks
+    # until when a brief dead time reaches back beyond a kink, and to what
+    fresh, past, some_brief = np.zeros(k), np.zeros((k, most + 1)), brief.any()
+
+    z, P, W = np.zeros(increments.shape[2]), np.zeros((1 + k, most + 1)), np.zeros(most + 1)
+    sizes, terms, later, negligible = np.zeros(len(z)), np.zeros(n), np.zeros(n), np.zeros(1 + k)
+    work = np.zeros((2, most + 1))
+    U, V = P[0], np.zeros((most + 1, n + 1 + k))
+    V[0, :n] = x0
+    rest = np.array([times(indptr, indices, data, n + 1 + j, V, 0) for j in range(k)])
+    V[0, n + 1 :] = np.where(brief, 0.0, rest)
+    x, scale, size = x0.copy(), np.abs(x0), np.zeros(1 + k)
+    size[1:] = np.abs(rest)
+    last = np.zeros(1 + k)
+    seen = np.zeros(signals - 1 - k)  # of what is watched
+    u = times(indptr, indices, data, n, V, 0)
+    mode = 1 if u > high else (-1 if u < low else 0)
+    kink, on_limit, standing = True, 0, 0
+    for g in range(len(samples)):
+        while sample[g] < samples.shape[1] and samples[g, sample[g]] < 0:
+            for o in range(groups[g], groups[g + 1]):
+                values[1 + o, sample[g]] = times(indptr, indices, data, n + 1 + k + o, V, 0)
+            sample[g] += 1
+    t, late, reset, status, steps, usual = 0.0, 0.0, 0, COMPLETE, 0, 0  # the time is t + late, lest it drifts
+
+    while t < horizon:
+        if steps == most_steps:
+            status = ENDLESS
+            break
+        steps += 1
+        t_next = min(t + step, horizon)
+        if queued > 0 and queue[0] - t < step * (1 + 1e-9):
+            t_next = min(queue[0], horizon)
+        if reset < len(reset_times) and reset_times[reset] < t_next:
+            t_next = reset_times[reset]
+
+        for j in range(k):
+            if brief[j] and kink and delays[j] > 1e-13 * (step + t):
+                fresh[j] = t + delays[j]
+            if brief[j] and t < fresh[j]:
+                t_next = min(t_next, fresh[j])
+        known = 0
+        for j in range(k):
+            for i in range(filled[j] + 1):
+                z[n + 1 + k * i + j] = 0.0
+            filled[j] = 0
+            start = t - delays[j]
+            middle = start + 0.5 * (t_next - t)  # decides the piece: the ends may lie on a kink
+            while cursor[j] + 1 < pieces and starts[(cursor[j] + 1) & wrap] <= middle:
+                cursor[j] += 1
+            if brief[j] and t >= fresh[j]:
+                continue
+            if middle < 0:
+                W[0], degree = rest[j], 0
+            else:
+                piece = cursor[j] & wrap
+                if starts[piece] + radii[piece] * step + delays[j] < t_next - 1e-9 * step:
+                    t_next = starts[piece] + radii[piece] * step + delays[j]
+                degree = degrees[piece]
+                for i in range(degree + 1):
+                    W[i] = history[piece, j, i]
+                moved = start - starts[piece] + (late - lates[piece])
+                if abs(moved) > 4e-16 * (step + t):  # else the same time, to rounding
+                    shift(W, degree, moved / step, work)
+            if brief[j]:
+                past[j] = 0.0
+                for i in range(degree + 1):
+                    past[j, i] = W[i]
+                continue
+            filled[j] = fill(z, n, k, j, W, degree, min(1.0, (t_next - t) / step + BEYOND), NEGLIGIBLE * size[1 + j])
+            known = max(known, filled[j])
+
+        which = 0 if mode == 0 else 1
+        for r in range(n):
+            z[r] = x[r]
+        z[n] = 0.0 if mode == 0 else (high if mode == 1 else low)
+        radius = min(1.0, (t_next - t) / step + BEYOND)
+        degree, power = unfold(tables, which, k, z, sizes, known, radius, usual, size, negligible, P, terms)
+        for trial in range(TRIALS if some_brief else 0):
+            settled = True
+            for j in range(k):
+                if brief[j]:
+                    ago = delays[j] / step if t >= fresh[j] else 0.0  # before a kink's image, what it was is known
+                    within = change(z, n, k, j, past[j], ago, P[1 + j], degree, radius, size[1 + j], filled, W, work)
+                    settled = settled and within <= SETTLED * negligible[1 + j]
+            known = filled.max()
+            degree, power = unfold(tables, which, k, z, sizes, known, radius, usual, size, negligible, P, terms)
+            if settled:
+                break
+            if trial == TRIALS - 1:
+                status = UNSETTLED
+        if status == UNSETTLED:
+            break
+        columns = whole_lanes(n + 1 + k * (known + 1))
+        usual = degree
+        if degree == most:  # a delayed signal may have terms beyond
+            for s in range(1 + k):
+                if abs(P[s, most]) * power > negligible[s]:
+                    last[s] = max(last[s], abs(P[s, most]) * power)
+
+        whole = abs(t_next - t - step) <= 1e-15 * (step + t)
+        if reset < len(reset_times) and t_next == reset_times[reset]:
+            whole = False  # it ends there to the last digit
+        reach = 1.0 if whole else max((t_next - t - late) / step, 0.0)
+        exit_at, entered, crossed = leave(U, degree, mode, on_limit, standing > 2, low, high, reach)
+        late_next = 0.0
+        if exit_at >= 0 or whole:
+            reach = exit_at if exit_at >= 0 else 1.0
+            t_next = t + (late + reach * step)
+            late_next = (late + reach * step) - (t_next - t)
+
+        if reach > 0 and k > 0:
+            piece = pieces & wrap
+            if pieces - cursor.min() >= room or queued + k > room:
+                status = CROWDED
+                break
+            starts[piece], lates[piece], radii[piece], degrees[piece] = t, late, radius, degree
+            for j in range(k):
+                for i in range(degree + 1):
+                    history[piece, j, i] = P[1 + j, i]
+            if kink:  # its images are mesh points, unless the two sides agree as far as they are read
+                left = (pieces - 1) & wrap
+                for j in range(k):
+                    W[0], before, moved = rest[j], 0, 0.0
+                    if pieces > 0:
+                        before, moved = degrees[left], (t - starts[left] + (late - lates[left])) / step
+                        for i in range(before + 1):
+                            W[i] = history[left, j, i]
+                    read = delays[j] / step if brief[j] else BEYOND
+                    if gap(W, before, moved, history[piece, j], degree, read, work) > negligible[1 + j]:
+                        queued = insert(queue, queued, t + delays[j], 1e-13 * (step + t))
+                kink = False
+            pieces += 1
+
+        for g in range(len(samples)):
+            begin = until = sample[g]
+            while until < samples.shape[1] and (samples[g, until] < t_next or t_next >= horizon):
+                until += 1
+            if until == begin:
+                continue
+            sample[g] = until
+            for o in range(-1 if g == 0 else groups[g], groups[g + 1]):
+                top = degree
+                if o < 0:
+                    for i in range(degree + 1):
+                        W[i] = U[i]
+                else:
+                    watched = 1 + k + o
+                    top = expand(
+                        tables, which, watched, signals, z, sizes, columns, degree, most, terms, later, seen, o, W
+                    )
+                for at in range(begin, until):
+                    tau, value = (samples[g, at] - t - late) / step, 0.0
+                    for i in range(top, -1, -1):
+                        value = value * tau + W[i]
+                    values[1 + o, at] = value
+
+        if reach == 1.0:
+            for r in range(n):
+                x[r] += dot(increments, which, r, z, columns)
+        elif reach > 0:
+            for i in range(known + 1):
+                for j in range(k):
+                    V[i, n + 1 + j] = z[n + 1 + k * i + j]
+            V[0, : n + 1] = z[: n + 1]
+            driven = 0  # degree to which the delayed signals matter as far as that
+            for j in range(k):
+                top, power = filled[j], reach ** filled[j]
+                while top > driven and abs(z[n + 1 + k * top + j]) * power <= NEGLIGIBLE * size[1 + j]:
+                    top -= 1
+                    power /= reach
+                driven = max(driven, top)
+            rows = unsaturated if mode == 0 else saturated
+            advance(rows, tables.influence[which, signals:], V, n, driven, most, scale, step, reach, x)
+            V[: known + 1, n + 1 :] = 0.0
+        for r in range(n):
+            scale[r] = max(scale[r], abs(x[r]))
+            if abs(x[r]) < NOTHING * scale[r]:  # lest it decay to numbers that the processor is slow with
+                x[r] = 0.0
+            if not abs(x[r]) < most_x:
+                status = DIVERGED
+        if not abs(U[0]) < most_u:
+            status = DIVERGED
+        standing = standing + 1 if reach == 0 else 0
+        t, late = t_next, late_next
+        if status == DIVERGED:
+            break
+
+        on_limit = crossed
+        if exit_at >= 0:
+            if event_count == most_events:
+                status = EVENTFUL
+                break
+            mode, kink = entered, True
+            events[event_count], modes[event_count] = t, mode
+            event_count += 1
+        elif reset < len(reset_times) and t == reset_times[reset]:
+            x[: resets.shape[1]] = resets[reset]
+            reset, kink = reset + 1, True
+        passed = 0
+        while passed < queued and queue[passed] <= t + 1e-13 * (step + t):
+            passed, kink = passed + 1, True
+        if passed > 0:
+            queued -= passed
+            for q in range(queued):
+                queue[q] = queue[q + passed]
+    tail = 0.0
+    for s in range(1 + k):
+        if size[s] > 0:
+            tail = max(tail, last[s] / size[s])
+    return values, events[:event_count], modes[:event_count], status, t, steps, tail

@@ -1,0 +1,151 @@
+"""The polynomials of a step's signals, each until a bound on what follows is negligible; compiled with numba."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+from numpy.typing import NDArray
+
+from experiments.engine.kinks import shift
+from experiments.engine.step_table import NEGLIGIBLE, NOTHING, ROUNDING, Tables, dot, whole_lanes
+
+Array = NDArray[Any]
+
+
+@njit(cache=True, nogil=True)
+def state_terms(tables: Tables, which: int, degree: int, z: Array, columns: int, size: Array) -> None:
+    """Fill size (n,) with the absolute values of x's coefficients of one degree."""
+    n = len(size)
+    for r in range(n):
+        size[r] = abs(dot(tables.terms, which, n * degree + r, z, columns))
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+def following(tables: Tables, which: int, signal: int, degree: int, terms: Array) -> float:
+    """A bound on all coefficients of a signal beyond a degree, which :func:`state_terms` of that degree gives."""
+    value = 0.0
+    for r in range(len(terms)):
+        value += tables.influence[which, signal, r] * terms[r]
+    return value / (degree + 1)
+
+
+@njit(cache=True, nogil=True)
+def fill(z: Array, n: int, k: int, j: int, c: Array, degree: int, radius: float, negligible: float) -> int:
+    """Put a delayed signal's coefficients into z but for the last, negligible ones; the degree that is left."""
+    power = radius**degree
+    while degree > 0 and abs(c[degree]) * power <= negligible:
+        degree -= 1
+        power /= radius
+    for i in range(degree + 1):
+        z[n + 1 + k * i + j] = c[i]
+    return degree
+
+
+@njit(cache=True, nogil=True)
+def change(
+    z: Array, n: int, k: int, j: int, past: Array, ago: float, now: Array, degree: int, radius: float, size: float,
+    filled: Array, W: Array, work: Array,
+) -> float:  # fmt: skip
+    """Put into z what a brief dead time changes of a signal; how much that differs from what z held before.
+
+    ``now`` (most + 1,) holds the signal's coefficients up to ``degree``. Before the dead time it was the same
+    polynomial ``ago`` steps earlier or, where that is 0, ``past`` (most + 1,). ``W`` (most + 1,) and ``work``
+    (2, most + 1) are room.
+    """
+    most = len(now) - 1
+    for i in range(most + 1):
+        W[i] = past[i] if ago == 0 else (now[i] if i <= degree else 0.0)
+    if ago > 0:
+        shift(W, degree, -ago, work)
+    for i in range(degree + 1):
+        W[i] -= now[i]
+    for i in range(most + 1):
+        work[0, i], z[n + 1 + k * i + j] = z[n + 1 + k * i + j], 0.0
+    filled[j] = fill(z, n, k, j, W, most, radius, NEGLIGIBLE * size)
+    difference, power = 0.0, 1.0
+    for i in range(most + 1):
+        difference += abs(z[n + 1 + k * i + j] - work[0, i]) * power
+        power *= radius
+    return difference
+
+
+@njit(cache=True, nogil=True)
+def unfold(
+    tables: Tables, which: int, k: int, z: Array, sizes: Array, known: int, radius: float, usual: int, size: Array,
+    negligible: Array, P: Array, terms: Array,
+) -> tuple[int, float]:  # fmt: skip
+    """Fill P (1 + k, most + 1) with the coefficients of u and Z x until all that follow are negligible up to a radius.
+
+    Parameters
+    ----------
+    tables, which
+        Of both modes, and the mode's.
+    z, known, radius
+        What the step begins with, the highest degree of a delayed signal in it, and how many steps far the polynomials
+        are read.
+    usual
+        The last step's degree, below which the end is not looked for.
+    sizes, size, negligible, terms
+        Filled with abs(z), the largest values of the signals so far, what is negligible beside them, and the absolute
+        values of x's coefficients of the last degree.
+
+    Returns
+    -------
+    degree, power
+        Of the last coefficient, and radius to that power.
+    """
+    n, signals, most = len(terms), tables.magnitudes.shape[1], P.shape[1] - 1
+    columns = whole_lanes(n + 1 + k * (known + 1))
+    for i in range(columns):
+        sizes[i] = abs(z[i])
+    for s in range(1 + k):
+        negligible[s] = ROUNDING * dot(tables.magnitudes, which, s, sizes, columns)
+    quiet, power = 0, 1.0
+    for degree in range(most + 1):
+        small = degree > known
+        upto = columns if small else whole_lanes(n + 1 + k * (degree + 1))  # of the causes of this degree
+        for s in range(1 + k):
+            c = dot(tables.polynomials, which, signals * degree + s, z, upto)
+            if degree == 0:
+                size[s] = max(size[s], abs(c))
+                negligible[s] = max(NEGLIGIBLE * size[s], negligible[s])
+            P[s, degree] = c if abs(c) > NOTHING * size[s] else 0.0
+            small = small and abs(c) * power <= negligible[s]
+        quiet = quiet + 1 if small else 0
+        if quiet > 1 and degree >= usual - 1:  # what follows may be negligible; most steps end as the last one did
+            state_terms(tables, which, degree, z, columns, terms)
+            for s in range(1 + k):
+                small = small and following(tables, which, s, degree, terms) * power <= negligible[s]
+            if small:
+                return degree, power
+        power *= radius
+    terms[:] = 0.0  # what the tables leave out is below rounding
+    return most, power / radius
+
+
+@njit(cache=True, nogil=True)
+def expand(
+    tables: Tables, which: int, signal: int, signals: int, z: Array, sizes: Array, columns: int, degree: int, most: int,
+    terms: Array, later: Array, size: Array, at: int, c: Array,
+) -> int:  # fmt: skip
+    """Fill c with a signal's coefficients until all that follow are negligible against its ``size[at]`` so far.
+
+    ``sizes`` is abs(z); ``terms`` holds the absolute values of x's coefficients of the given ``degree``, beyond which
+    delayed signals have none; ``later`` (n,) is room for those of higher degrees. Returns the degree.
+    """
+    for i in range(degree + 1):
+        c[i] = dot(tables.polynomials, which, signals * i + signal, z, columns)
+    size[at] = max(size[at], abs(c[0]))
+    negligible = max(NEGLIGIBLE * size[at], ROUNDING * dot(tables.magnitudes, which, signal, sizes, columns))
+    bound = following(tables, which, signal, degree, terms)
+    while degree < most and bound > negligible:
+        degree += 1
+        c[degree] = dot(tables.polynomials, which, signals * degree + signal, z, columns)
+        state_terms(tables, which, degree, z, columns, later)
+        bound = following(tables, which, signal, degree, later)
+    left_out = abs(c[degree])
+    while degree > 0 and left_out <= ROUNDING * size[at]:
+        degree -= 1
+        left_out += abs(c[degree])
+    return degree

@@ -1,0 +1,151 @@
+"""The saturated loop with its exact dead time: one engine for every experiment."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.engine import integrator
+from experiments.engine.compiled_loop import BRIEF, CompiledLoop, compile_loop
+from experiments.engine.saturated_loop import SaturatedLoop
+from identification.base.errors import InputError
+
+MOST_STEPS = 2e7  # a few minutes
+MOST_ROOM = 1e8  # numbers, a gigabyte
+TAIL = 1e-11  # of a polynomial's terms, see integrate
+
+
+@dataclass(frozen=True)
+class Run:
+    """A simulated run at the sample times.
+
+    Parameters
+    ----------
+    time_s
+        Shape (s,).
+    control, saturated_control
+        u and sat(u), shape (s,).
+    outputs
+        Name -> samples (s,).
+    events_s, modes
+        Every time at which u crosses a limit, located to rounding, and the mode entered: 1 at the upper limit,
+        -1 at the lower one, 0 unsaturated. A jump of u across both limits is two events at one time.
+    """
+
+    time_s: np.ndarray
+    control: np.ndarray
+    saturated_control: np.ndarray
+    outputs: Mapping[str, np.ndarray]
+    events_s: np.ndarray
+    modes: np.ndarray
+
+
+class DivergenceError(InputError):
+    """The control passed 1e100 times the limits, or without limits a state 1e100, at ``time_s`` seconds."""
+
+    def __init__(self, time_s: float) -> None:
+        super().__init__(
+            f"the loop diverges: the control passed 1e100 times the limits, or without limits a signal 1e100, at t = "
+            f"{time_s:.6g} s"
+        )
+        self.time_s = time_s
+
+
+def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarray) -> Run:
+    """Simulate a loop from t = 0; what is left out, u - sat(u), is the dead zone of Thesis Eq. (2.16).
+
+    Parameters
+    ----------
+    loop
+        See :class:`SaturatedLoop`.
+    limits
+        (sigma_1, sigma_2) of the saturation, sigma_1 < sigma_2, either may be infinite.
+    time_s
+        Increasing sample times (s,), the first at 0 or later; they do not influence the integration.
+
+    Raises
+    ------
+    InputError
+        The limits are not in order, the times not increasing, the run too long for
+        its fastest time constant, or the control chatters past all bounds.
+    DivergenceError
+        The loop diverges.
+
+    Notes
+    -----
+    Dead times are exact and events are located on the polynomials, see :mod:`experiments.engine.integrator`. The step,
+    see :func:`experiments.engine.compiled_loop.compile_loop`, is halved until the last term of every polynomial is
+    below 1e-11 of the largest value of its signal.
+    """
+    low, high = limits
+    if not low < high:
+        raise InputError(f"the saturation limits are {low:g} and {high:g}; expected the lower one first")
+    increasing = len(time_s) > 0 and time_s[0] >= 0 and time_s[-1] > 0 and np.all(np.diff(time_s) > 0)
+    if not (increasing and np.all(np.isfinite(time_s))):
+        raise InputError("the sample times are not increasing finite numbers from zero on that end after zero")
+    horizon = float(time_s[-1])
+    compiled = compile_loop(loop, idle_step=horizon)
+    most_events, room, brief = 4096, _room(compiled), BRIEF
+    while True:
+        if room * compiled.tables.increments.shape[2] > MOST_ROOM:
+            raise InputError(
+                f"the dead times reach from {compiled.delays.min():.3g} to {compiled.delays.max():.3g} s, too many "
+                "steps to remember; expected dead times that differ less, or zero"
+            )
+        step = compiled.step
+        if horizon / step > MOST_STEPS:
+            raise InputError(
+                f"the run needs {horizon / step:.3g} steps of {step:.3g} s, set by its shortest dead time or fastest "
+                f"pole; expected at most {MOST_STEPS:.3g} (a shorter run, a dead time of zero, or a slower design)"
+            )
+        values, events, modes, status, end, _, tail = integrator.integrate(
+            compiled.unsaturated,
+            compiled.saturated,
+            compiled.tables,
+            compiled.delays,
+            compiled.brief,
+            compiled.x0,
+            loop.resets.times_s,
+            loop.resets.values,
+            float(low),
+            float(high),
+            horizon,
+            step,
+            time_s - compiled.lags[:, None],
+            compiled.groups,
+            int(MOST_STEPS),
+            most_events,
+            room,
+        )
+        if status == integrator.CROWDED:
+            room *= 2
+        elif status == integrator.EVENTFUL:
+            most_events *= 8
+        elif status == integrator.UNSETTLED or (status == integrator.COMPLETE and tail > TAIL):
+            brief = 0.0 if status == integrator.UNSETTLED else brief
+            compiled = compile_loop(loop, step / 2, brief)
+            room = max(room, _room(compiled))
+        else:
+            break
+    if status == integrator.DIVERGED:
+        raise DivergenceError(end)
+    if status != integrator.COMPLETE:
+        raise InputError(f"the loop could not be integrated: {len(events)} events up to t = {end:.6g} s")
+    outputs = compiled.reading @ values[1:]
+    return Run(
+        time_s=time_s,
+        control=values[0],
+        saturated_control=np.clip(values[0], low, high),
+        outputs=dict(zip(loop.outputs, outputs, strict=True)),
+        events_s=events,
+        modes=modes,
+    )
+
+
+def _room(compiled: CompiledLoop) -> int:
+    """Room for the steps that the longest dead time remembers, twice as many, and a power of two."""
+    longest = float(compiled.delays.max(initial=0.0))
+    return 1 << math.ceil(math.log2(64 + 2 * longest / compiled.step))

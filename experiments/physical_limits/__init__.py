@@ -1,0 +1,1 @@
+"""Tool: the least peak error that any controller reaches under the limits."""

@@ -1,0 +1,254 @@
+"""The least peak error under a limited input as a linear program, enclosed by an input and by a dual certificate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import scipy.sparse as sparse
+from scipy.linalg import expm
+from scipy.optimize import linprog
+
+from experiments.physical_limits.certificates import Samples, forced, reached, whole
+from experiments.physical_limits.exact_chain import fastest
+from experiments.physical_limits.intervals import Interval, outward
+from experiments.physical_limits.response_cells import UNIT, Cells
+from experiments.runs.references import Reference
+from identification.base.errors import InputError
+from identification.model.plant import PlantModel
+
+SAMPLES = 4  # times in a step at which the program knows the error
+REFINED = 4  # parts of a step, each with a value of u of its own, near the time from which the error counts
+NEAR = (20, 2)  # steps before and after that time that are refined
+PHASE = 0.3  # most that the fastest pole turns or decays within a cell, rad
+WIDTHS = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0)  # of the averages that are tried, in steps
+PASSES = 3  # three boxes in a row are a smooth bell
+SPARE = 6  # steps at the end of a start from rest that only serve the averages
+MOST_CELLS = 2_000_000
+# the first is the fastest, the others seldom fail
+ATTEMPTS: tuple[tuple[Literal["highs-ipm", "highs-ds"], bool], ...] = (
+    ("highs-ipm", True),
+    ("highs-ipm", False),
+    ("highs-ds", False),
+)
+
+
+@dataclass(frozen=True)
+class PeakProgram:
+    """min over u, |u| <= limit, of the greatest |r(t) - y(t)| from a given time on, y the output of a plant.
+
+    Parameters
+    ----------
+    plant
+        Strictly proper; its dead time is left out.
+    span_s
+        The period, or from rest at t = 0 the horizon, in seconds.
+    steps
+        Intervals of ``span_s`` in each of which the program holds u; its bounds are evaluated on finer cells.
+    periodic
+        Whether u and y are periodic; else y starts from rest. Where the plant has a pole at zero, a periodic u has
+        the mean zero and y a free constant.
+
+    Raises
+    ------
+    InputError
+        The fastest pole asks for more than two million cells.
+    """
+
+    plant: PlantModel
+    span_s: Fraction
+    steps: int
+    periodic: bool
+
+    def __post_init__(self) -> None:
+        if self.fineness * self.steps > MOST_CELLS:
+            raise InputError(
+                f"the plant's fastest pole, {self._fastest:.4g} rad/s, is too fast beside {float(self.span_s):.4g} s "
+                f"of reference; expected at most {MOST_CELLS * PHASE / float(self.span_s):.3g} rad/s"
+            )
+
+    @property
+    def _centred(self) -> bool:
+        return self.periodic and self.plant.integrators > 0
+
+    @cached_property
+    def _cells(self) -> Cells:
+        count = self.fineness * self.steps
+        return Cells(self.plant, self.span_s / count, count, "periodic" if self.periodic else "rest")
+
+    @cached_property
+    def _fastest(self) -> float:
+        return fastest(self.plant)
+
+    @property
+    def fineness(self) -> int:
+        """Cells in a step."""
+        sample_s = float(self.span_s) / (self.steps * SAMPLES * REFINED)
+        return SAMPLES * REFINED * max(1, int(np.ceil(sample_s * self._fastest / PHASE)))
+
+    @property
+    def part(self) -> int:
+        """Cells in a part of a refined step."""
+        return self.fineness // REFINED
+
+    @property
+    def cell_s(self) -> float:
+        """Length of a cell in seconds."""
+        return float(self.span_s) / (self.steps * self.fineness)
+
+    @property
+    def counted(self) -> int:
+        """How many of ``time_s`` count: from rest all but those in the last six steps."""
+        return len(self.time_s) - (0 if self.periodic else SPARE * self.fineness)
+
+    @cached_property
+    def time_s(self) -> np.ndarray:
+        """Ends of the cells, shape (cells + 1,); of a periodic program without the last, (cells,)."""
+        return np.arange(self.steps * self.fineness + (not self.periodic)) * self.cell_s
+
+    def solve(self, reference: Reference, limit: float, first: int = 0, ahead_s: float = 0.0) -> Interval:
+        """Enclose the least peak error.
+
+        Parameters
+        ----------
+        reference
+            r; if the program is periodic, of its period.
+        limit
+            Of |u|, positive.
+        first
+            Index into ``time_s`` from which on the error counts, a multiple of ``part``; 0 if periodic.
+        ahead_s
+            r(t + ahead_s) is followed.
+
+        Returns
+        -------
+        Interval
+            In the unit of y. No measurable u with |u| <= limit stays below ``lower``; some u reaches ``upper``. Both
+            are bounds of the plant and the reference as their numbers say, all roundings included, that of a table to
+            12 digits too.
+
+        Raises
+        ------
+        InputError
+            The program could not be solved, or the plant is too slow or turns too often for a bound.
+
+        Notes
+        -----
+        The program holds u and knows e at samples only. What that leaves open is closed by moving averages: averaged, u
+        keeps its limit and stops exciting resonances between the samples, and the program's dual weights excite the
+        plant less. What an average of u reaches, :func:`experiments.physical_limits.certificates.reached` bounds; what
+        weights prove, whichever they are, :func:`experiments.physical_limits.certificates.forced`. Several averages are
+        tried and the best bound of each kind kept: every one of them holds, however well the program was solved.
+        """
+        values = reference(self.time_s + ahead_s)
+        if self._centred:  # a constant counts for nothing
+            values = values - (values.max() + values.min()) / 2
+        scale = float(np.abs(values).max()) or 1.0
+        doubt = reference.rounding(float(self.span_s) + ahead_s) / scale + 4 * UNIT
+        r, gain = Samples(values / scale, doubt, reference.bend * self.cell_s**2 / 8 / scale), limit / scale
+        u, mu = self._optimum(r.values, gain, first)
+        cells, more = self._cells, gain * (1 + 2 * UNIT)
+        counted = slice(first, self.counted)
+        controls = (whole(self._average(u, width, first), self._centred) for width in WIDTHS)
+        uppers = [reached(cells, control, r, more, counted) for control in controls]
+        lowers = [forced(cells, self._weights(mu, width, first), r, more) for width in WIDTHS] if mu.any() else [0.0]
+        return outward(scale * max(0.0, *lowers), scale * min(uppers))
+
+    def _weights(self, mu: np.ndarray, width: float, first: int) -> np.ndarray:
+        """Averaged weights for :func:`experiments.physical_limits.certificates.forced`, none at the end of the span."""
+        weights = self._average(mu, width, first)
+        weights[self.counted :] = 0.0
+        return whole(weights / np.abs(weights).sum(), self._centred)
+
+    def _edges(self, first: int) -> np.ndarray:
+        """Where the steps begin and end, in cells; from rest they are refined near ``first``."""
+        whole = np.arange(self.steps + 1) * self.fineness
+        if self.periodic:
+            return whole
+        parts = np.arange(self.steps * REFINED + 1) * self.part
+        before, after = (steps * self.fineness for steps in NEAR)
+        return np.union1d(whole, parts[(parts >= first - before) & (parts <= first + after)])
+
+    def _optimum(self, r: np.ndarray, gain: float, first: int) -> tuple[np.ndarray, np.ndarray]:
+        """Solve the program: u in every cell, as a share of its limit, and the weights of e at the cells' ends.
+
+        The variables are the states at the steps' ends (but for the start from rest), u in the steps, the peak.
+        """
+        c, n = self._cells.chain.c[None, :], len(self._cells.chain.b)
+        edges = self._edges(first)
+        lengths = np.diff(edges)
+        steps = len(lengths)
+        ends = steps + (not self.periodic)
+        state = sparse.eye_array(ends).tocsr()[:, 0 if self.periodic else 1 :]
+        before, after = state[:steps], state[np.arange(1, steps + 1) % ends]
+        dynamics: Any = sparse.hstack([sparse.kron(after, np.eye(n)), sparse.csr_array((n * steps, steps + 1))])
+        outputs, samples = [], []
+        for length in np.unique(lengths):
+            chosen = np.flatnonzero(lengths == length)
+            these = sparse.eye_array(steps).tocsr()[chosen]
+            kept, driven = self._over(length)
+            nothing = sparse.csr_array((n * steps, 1))
+            flow = [sparse.kron(these.T @ these @ before, kept), sparse.kron(these.T @ these, driven[:, None])]
+            dynamics = dynamics - sparse.hstack([*flow, nothing])
+            for inside in range(0, length, length // SAMPLES):
+                kept, driven = self._over(inside)
+                outputs.append(sparse.hstack([sparse.kron(these @ before, c @ kept), (c @ driven)[0] * these]))
+                samples.append(edges[chosen] + inside)
+        if not self.periodic:
+            outputs.append(sparse.hstack([sparse.kron(state[-1:], c), sparse.csr_array((1, steps))]))
+            samples.append(edges[-1:])
+        sampled = np.concatenate(samples)
+        counted = np.flatnonzero(sampled >= first)
+        output, sampled = gain * sparse.vstack(outputs).tocsr()[counted], sampled[counted]
+        peak = sparse.csr_array(-np.ones((len(counted), 1)))
+        both: Any = sparse.vstack([sparse.hstack([output, peak]), sparse.hstack([-output, peak])])
+        control = slice(output.shape[1] - steps, output.shape[1])
+        bounds: Any = np.full((output.shape[1] + 1, 2), [-np.inf, np.inf])
+        bounds[control] = -1.0, 1.0
+        for method, presolve in ATTEMPTS:
+            solution = linprog(
+                np.append(np.zeros(output.shape[1]), 1.0),
+                A_ub=both,
+                b_ub=np.concatenate([r[sampled], -r[sampled]]),
+                A_eq=dynamics,
+                b_eq=np.zeros(n * steps),
+                bounds=bounds,
+                method=method,
+                options={"presolve": presolve},
+            )
+            if solution.status == 0:
+                break
+        else:
+            raise InputError(
+                "the linear program of the least error was not solved; expected a limit nearer to the control that the "
+                f"reference takes (the solver says: {' '.join(str(solution.message).split())})"
+            )
+        u, prices = np.clip(np.asarray(solution.x)[control], -1.0, 1.0), np.asarray(solution.ineqlin.marginals)
+        weights = prices[: len(counted)] - prices[len(counted) :]
+        if self._centred:
+            u, weights = u - u.mean(), weights - weights.mean()
+        mu = np.zeros(len(r))
+        mu[sampled] = weights
+        return np.repeat(u / max(1.0, np.abs(u).max()), lengths), mu
+
+    def _over(self, cells: int) -> tuple[np.ndarray, np.ndarray]:
+        """What becomes of the states in so many cells, by themselves and under u = 1."""
+        chain = self._cells.chain
+        n = len(chain.b)
+        both = expm(cells * np.block([[chain.A, chain.b[:, None]], [np.zeros((1, n + 1))]]))
+        return both[:n, :n], both[:n, n]
+
+    def _average(self, values: np.ndarray, width: float, first: int) -> np.ndarray:
+        """Repeated moving averages, from ``first`` on, of values in the cells or at their ends.
+
+        Where there is no period to go on with, the values are mirrored at both ends. As a matrix that is symmetric
+        with rows of non-negative shares, sum 1: it averages, keeps the sum, and may be put on mu as well as on e.
+        """
+        half, later = int(width * self.fineness / 2), values[first:]
+        for _ in range(PASSES):
+            total = np.append(0.0, np.cumsum(np.pad(later, half, mode="wrap" if self.periodic else "symmetric")))
+            later = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+        return np.append(values[:first], later)

@@ -1,0 +1,1 @@
+"""Tool: a design and a reference -> loops, runs, metrics, and what the guarantee covers."""

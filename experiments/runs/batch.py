@@ -1,0 +1,124 @@
+"""Many closed loops in one call: every plant with every reference, anti-windup and limit, on all cores."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from tqdm import tqdm
+
+from design.anti_windup.compensator import AntiWindup
+from design.design_file import Design
+from experiments.engine.simulate import Run, simulate
+from experiments.runs.design_loop import Controller, plant_loop, realized_controller
+from experiments.runs.references import Reference, SampledReference
+from identification.base.errors import InputError
+from identification.model.plant import PlantModel
+
+IN_FLIGHT = 4  # runs a worker
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+Tick = Callable[[], object]
+
+
+class Case(NamedTuple):
+    """What was run: the true plant, the reference, the anti-windup's name, and sat to +-limit."""
+
+    plant: PlantModel
+    reference: Reference | SampledReference
+    anti_windup: str
+    limit: float
+
+
+def simulate_many(
+    design: Design,
+    plants: Iterable[PlantModel],
+    references: Sequence[Reference | SampledReference],
+    anti_windups: Mapping[str, AntiWindup | None],
+    limits: Sequence[float],
+    time_s: np.ndarray,
+    workers: int | None = None,
+) -> Iterator[tuple[Case, Run | InputError]]:
+    """Simulate a design around every plant with every reference, anti-windup and limit, from rest.
+
+    Parameters
+    ----------
+    design, time_s
+        As for :func:`experiments.runs.design_loop.design_loop` and :func:`experiments.engine.simulate.simulate`.
+    plants
+        The true plants; may be a generator, from which no more is taken than is run.
+    references, anti_windups, limits
+        r(t); name -> theta1~, None for no anti-windup; positive, the actuator's limits are +-limit.
+    workers
+        Threads; as many as there are cores unless given.
+
+    Yields
+    ------
+    (Case, Run or InputError)
+        In the order of ``itertools.product(plants, references, anti_windups, limits)``, as they are done; a loop that
+        diverges or is refused gives the error that :func:`experiments.engine.simulate.simulate` raises. No more than
+        :data:`IN_FLIGHT` runs a worker are held at a time. On a terminal a bar counts them.
+
+    Raises
+    ------
+    InputError
+        A limit that is not positive, or fewer workers than one.
+
+    Notes
+    -----
+    The integration runs without Python's lock. What is left under it is a tenth of a run, so that threads serve up to
+    some eight cores; a campaign (:mod:`experiments.campaign.run_plants`) runs in processes, or on a cluster.
+    """
+    references, limits = tuple(references), tuple(limits)
+    if bad := [limit for limit in limits if not limit > 0]:
+        raise InputError(f"a limit is {bad[0]:g}; expected positive numbers")
+    count = os.cpu_count() or 1 if workers is None else workers
+    if count < 1:
+        raise InputError(f"{count} workers are asked for; expected one at least")
+    controllers = {name: realized_controller(design, kind) for name, kind in anti_windups.items()}
+    cases = (Case(plant, *rest) for plant in plants for rest in itertools.product(references, anti_windups, limits))
+    return _streamed(cases, controllers, time_s, count)
+
+
+def _streamed(
+    cases: Iterator[Case], controllers: Mapping[str, Controller], time_s: np.ndarray, workers: int
+) -> Iterator[tuple[Case, Run | InputError]]:
+    def run(case: Case) -> Run | InputError:
+        try:
+            loop = plant_loop(controllers[case.anti_windup], case.plant, case.reference)
+            return simulate(loop, (-case.limit, case.limit), time_s)
+        except InputError as error:
+            return error
+
+    ahead: deque[tuple[Case, Future[Run | InputError]]] = deque()
+    with ThreadPoolExecutor(workers) as pool, tqdm(desc="runs", unit="", disable=None, leave=False) as bar:
+        try:
+            while True:
+                ahead.extend(
+                    (case, pool.submit(run, case)) for case in itertools.islice(cases, IN_FLIGHT * workers - len(ahead))
+                )
+                if not ahead:
+                    return
+                case, future = ahead.popleft()
+                yield case, future.result()
+                bar.update()
+        finally:  # whoever stops taking results stops the runs that have not begun
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def threaded(work: Callable[[Item], Result], items: Iterable[Item], tick: Tick) -> list[Result]:
+    """The results of ``work`` in the order of the items, by as many threads as there are cores; ticks for each."""
+
+    def counted(item: Item) -> Result:
+        result = work(item)
+        tick()
+        return result
+
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        return list(pool.map(counted, items))

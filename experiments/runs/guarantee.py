@@ -1,0 +1,111 @@
+"""What a design guarantees of its saturated runs with one anti-windup: the sector of the circle criterion, or why none.
+
+What the sector is good for, and which sector a run needs, says :mod:`experiments.runs.sector_promise`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.anti_windup.circle_criterion import circle_sector
+from design.anti_windup.compensator import AntiWindup
+from design.blocks.block import bound_block, plant_block
+from design.blocks.frequency_peak import frequency_grid
+from design.design_file import Design
+from design.stability.margins import delay_loop, margins_of, responses
+from identification.base.errors import InputError
+from identification.model.plant import PlantModel
+
+FINE = 200  # frequencies a decade where a true plant is compared with the bound
+TURNED = 1.0  # rad between neighbouring frequencies, beyond which exp(-j omega (h' - h)) may be anything
+
+
+@dataclass(frozen=True)
+class Guarantee:
+    """What a design promises of its runs with one anti-windup.
+
+    Parameters
+    ----------
+    sector
+        k_c: it promises something of every run that needs a smaller sector; 0: of none.
+    missing
+        Why of none, as a sentence without its full stop; else empty.
+    """
+
+    sector: float
+    missing: str = ""
+
+
+def guarantee(design: Design, anti_windup: AntiWindup, plant: PlantModel | None = None) -> Guarantee:
+    """What a design promises of its runs under a reference.
+
+    Parameters
+    ----------
+    design, anti_windup
+        The design and its theta1~.
+    plant
+        The true plant, the model unless given. Another one is covered only as one of all plants within W_a.
+    """
+    if plant is None or plant == design.loop_plant:
+        return _without_theta2(design, anti_windup) or Guarantee(circle_sector(anti_windup.theta1_tilde))
+    if not _is_within(design, plant):
+        return Guarantee(0.0, "the true plant is not within W_a of the design's model")
+    return guarantee_within(design, anti_windup)
+
+
+def guarantee_within(design: Design, anti_windup: AntiWindup) -> Guarantee:
+    """What a design promises of runs with every plant within W_a, see :func:`design.anti_windup.popov.robust_loss`."""
+    if missing := _without_theta2(design, anti_windup):
+        return missing
+    from design.anti_windup.popov import robust_loss  # only here: it takes a third of a second to import
+
+    plant, bound = design.loop_plant, design.additive_bound
+    loop = delay_loop(design, plant)
+    try:
+        margins = margins_of(loop, bound)
+    except InputError as error:
+        return Guarantee(0.0, str(error))
+    if not margins.is_guaranteed:
+        reached = f"{margins.W_a_C_S.value:.3g}"
+        return Guarantee(0.0, f"|W_a C S| reaches {reached}, so nothing is promised for the plants within W_a")
+
+    def robustness(omega: np.ndarray) -> np.ndarray:
+        return np.asarray(np.abs(bound(1j * omega) * responses(loop, omega)[1]))
+
+    blocks = (loop.plant, loop.forward, loop.feedback, bound_block(bound), anti_windup.one_plus)
+    roots = tuple(root for block in blocks for root in block.zeros + block.poles)
+    sector = circle_sector(anti_windup.theta1_tilde, robust_loss(anti_windup.one_plus, robustness), roots)
+    return Guarantee(sector)
+
+
+def _without_theta2(design: Design, anti_windup: AntiWindup) -> Guarantee | None:
+    if anti_windup.theta2(design.loop_plant).is_stable:
+        return None
+    sector = sector_text(circle_sector(anti_windup.theta1_tilde))
+    return Guarantee(
+        0.0,
+        "theta2 is not stable, so the output keeps what saturation leaves in it, and of Popov's sectors only that of "
+        f"the circle criterion, {sector}, counts under a reference",
+    )
+
+
+def _is_within(design: Design, true: PlantModel) -> bool:
+    """Whether |P_true - P| <= |W_a| on a fine grid and as omega -> 0 and infinity."""
+    plant, bound = design.loop_plant, design.additive_bound
+    blocks = plant_block(plant), plant_block(true), bound_block(bound)
+    if plant.integrators != true.integrators or (plant.integrators and plant.gain != true.gain):
+        return False  # the difference has a pole at s = 0
+    if min(plant.relative_degree, true.relative_degree) < blocks[2].relative_degree:
+        return False  # the bound falls faster
+    omega = frequency_grid([root for block in blocks for root in block.zeros + block.poles], per_decade=FINE)
+    s = 1j * omega
+    turned = np.gradient(omega) * abs(true.delay_s - plant.delay_s) > TURNED
+    difference = np.where(turned, np.abs(true(s)) + np.abs(plant(s)), np.abs(true(s) - plant(s)))
+    return bool(np.all(difference <= np.abs(bound(s))))
+
+
+def sector_text(sector: float, digits: int = 3) -> str:
+    """A sector in so many digits, of its distance from 1 in one less where that is small."""
+    return f"1 - {1 - sector:.{digits - 1}g}" if 0.9995 <= sector < 1 else f"{sector:.{digits}g}"

@@ -1,0 +1,177 @@
+"""What is simulated: references, the PID benchmark, and the thesis's own values of both."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from design.blocks.state_space import block_diagonal
+from experiments.engine.saturated_loop import NO_RESETS, Resets
+from experiments.runs.steady_control import PI, Peak, peak, response
+from identification.base.errors import InputError
+from identification.model.plant import PlantModel
+
+
+@dataclass(frozen=True)
+class Generator:
+    """z' = matrix z from z(0) = start with resets; r = row z.
+
+    Parameters
+    ----------
+    matrix, row, start
+        Shapes (g, g), (g,), (g,).
+    resets
+        Of all its states.
+    """
+
+    matrix: np.ndarray
+    row: np.ndarray
+    start: np.ndarray
+    resets: Resets
+
+
+@dataclass(frozen=True)
+class Reference:
+    """r(t) = sum of amplitude_i sin(omega_i t + phase_i) + offset + slope t.
+
+    Parameters
+    ----------
+    amplitudes, offset, slope
+        In the plant's output unit, and in that unit per second.
+    omegas
+        In rad/s, not negative; as many as there are amplitudes.
+    phases_rad
+        In radians; as many.
+    """
+
+    amplitudes: tuple[float, ...]
+    omegas: tuple[float, ...]
+    phases_rad: tuple[float, ...]
+    offset: float
+    slope: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not len(self.amplitudes) == len(self.omegas) == len(self.phases_rad) > 0:
+            raise InputError(
+                f"the reference has {len(self.omegas)} frequencies, {len(self.amplitudes)} amplitudes and "
+                f"{len(self.phases_rad)} phases; expected as many of each, and one at least"
+            )
+        numbers = [*self.amplitudes, *self.omegas, *self.phases_rad, self.offset, self.slope]
+        if not np.isfinite(numbers).all() or min(self.omegas) < 0:
+            raise InputError(f"the reference is {self}; expected finite numbers and omega >= 0")
+
+    def __call__(self, time_s: np.ndarray) -> np.ndarray:
+        """r at times of any shape."""
+        parts = zip(self.amplitudes, self.omegas, self.phases_rad, strict=True)
+        waves = sum(a * np.sin(omega * time_s + phase) for a, omega, phase in parts)
+        return np.asarray(waves + self.offset + self.slope * time_s)
+
+    def rounding(self, until_s: float) -> float:
+        """A bound of what r computed at times up to ``until_s`` is off, even if these are off by 4 roundings."""
+        parts = zip(self.amplitudes, self.omegas, self.phases_rad, strict=True)
+        count = len(self.amplitudes)
+        waves = sum(abs(a) * (8 * (omega * until_s + abs(phase)) + 8 + count) for a, omega, phase in parts)
+        return 2.0**-52 * float(waves + 8 * (abs(self.offset) + abs(self.slope) * until_s))
+
+    @property
+    def bend(self) -> float:
+        """The most that |r''| reaches, or more: the sum of |amplitude| omega^2."""
+        return float(sum(abs(a) * omega**2 for a, omega in zip(self.amplitudes, self.omegas, strict=True)) * (1 + 1e-9))
+
+    @property
+    def amplitude(self) -> float:
+        """The sum of the amplitudes' sizes, in the plant's output unit: the scale of every band.
+
+        The sinusoids never exceed it together; unless their frequencies are independent they may stay below it.
+        """
+        return float(np.abs(self.amplitudes).sum())
+
+    @property
+    def period_s(self) -> float:
+        """Of the slowest sinusoid, in seconds; infinite when all is constant."""
+        slowest = min((omega for omega in self.omegas if omega > 0), default=None)
+        return math.inf if slowest is None else 2 * math.pi / slowest
+
+    @property
+    def exact_period_s(self) -> Fraction:
+        """:attr:`period_s`, which is finite, to 80 digits."""
+        return 2 * PI / Fraction(min(omega for omega in self.omegas if omega > 0))
+
+    def required(self, plant: PlantModel) -> Peak:
+        """The most that the control reaches which keeps the plant's output on r in the steady state, in its input unit.
+
+        It is the control (r/P)(t) = sum of amplitude_i/|P(j omega_i)| sin(omega_i t + phase_i - arg P(j omega_i)), a
+        constant of r over the gain of a plant that does not integrate, and slope/gain of a plant with one integrator.
+        Infinite for a slope that a plant without an integrator would have to follow. See
+        :func:`experiments.runs.steady_control.peak`.
+        """
+        parts = list(zip(self.amplitudes, self.omegas, self.phases_rad, strict=True))
+        constant = self.slope / plant.gain if plant.integrators == 1 else 0.0
+        if plant.integrators == 0:
+            if self.slope:
+                return Peak(math.inf, math.inf)
+            constant = (self.offset + sum(a * math.sin(phase) for a, omega, phase in parts if omega == 0)) / plant.gain
+        return peak([response(plant, *part) for part in parts if part[1] > 0], constant)
+
+    def generator(self) -> Generator:
+        """Its oscillators, and a constant with its integral."""
+        waves = (np.array([[0.0, omega], [-omega, 0.0]]) for omega in self.omegas)
+        matrix = block_diagonal(*waves, np.array([[0.0, 1.0], [0.0, 0.0]]))
+        row = [number for amplitude in self.amplitudes for number in (amplitude, 0.0)]
+        start = [number for phase in self.phases_rad for number in (math.sin(phase), math.cos(phase))]
+        return Generator(matrix, np.array([*row, 1.0, 0.0]), np.array([*start, self.offset, self.slope]), NO_RESETS)
+
+
+@dataclass(frozen=True)
+class SampledReference:
+    """r(t) by straight lines between samples; before the first and after the last it stays as it is there.
+
+    Parameters
+    ----------
+    time_s
+        Shape (s,), increasing, in seconds.
+    values
+        Shape (s,), in the plant's output unit.
+    """
+
+    time_s: np.ndarray
+    values: np.ndarray
+
+    def __post_init__(self) -> None:
+        if not (self.time_s.shape == self.values.shape and self.time_s.ndim == 1 and len(self.time_s) > 0):
+            raise InputError(
+                f"the sampled reference has shapes {self.time_s.shape} and {self.values.shape}; expected as many times "
+                "as values, and one at least"
+            )
+        if not (np.isfinite(self.time_s).all() and np.isfinite(self.values).all()):
+            raise InputError("the sampled reference is not finite; expected finite numbers")
+        if np.any(np.diff(self.time_s) <= 0):
+            raise InputError("the times of the sampled reference do not increase; expected increasing times")
+
+    def __call__(self, time_s: np.ndarray) -> np.ndarray:
+        """r at times of any shape."""
+        return np.interp(time_s, self.time_s, self.values)
+
+    @property
+    def amplitude(self) -> float:
+        """Half the distance of its extremes, in the plant's output unit."""
+        return float(np.ptp(self.values)) / 2
+
+    def generator(self) -> Generator:
+        """An integrator and its slope, both set at every sample after t = 0."""
+        knots = np.union1d(self.time_s[self.time_s > 0], 0.0)
+        levels = self(knots)
+        slopes = np.append(np.diff(levels) / np.diff(knots), 0.0)
+        if knots[0] < self.time_s[0]:
+            slopes[0] = 0.0
+        pieces = np.column_stack([levels, slopes])
+        matrix, row = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([1.0, 0.0])
+        return Generator(matrix, row, pieces[0], Resets(knots[1:], pieces[1:]))
+
+
+def sinusoid(amplitude: float, omega: float, phase_rad: float, offset: float) -> Reference:
+    """r(t) = amplitude sin(omega t + phase_rad) + offset, omega in rad/s."""
+    return Reference((amplitude,), (omega,), (phase_rad,), offset)

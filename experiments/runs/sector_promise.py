@@ -1,0 +1,267 @@
+"""The sector that a run under a reference needs, and whether the circle criterion guarantees it.
+
+The control obeys u = v - theta1~ u_tilde, u_tilde = u - sat(u), where v is the control of the loop without saturation.
+It settles at v_s, whose output is the reference. The deviation d = u - v_s obeys
+
+    d = (v - v_s) - theta1~ u_tilde,
+
+and u_tilde is a function of d that varies with time. While |v_s| < L that function is 0 at d = 0, and its secant
+
+    (u - sat(u))/(u - v_s), at most (U - L)/(U - V) for |u| <= U and |v_s| <= V < L,
+
+is the sector that the run needs. Let its largest value be k, and k_c the sector of the circle criterion: Re theta1~ +
+1/k_c >= 0 at all frequencies. Of every k < k_c, from u_tilde (d - u_tilde/k) >= 0 at all times and Parseval's theorem,
+
+    the norm of u_tilde <= the norm of v - v_s, divided by 1/k - 1/k_c                        (norms: L_2 from 0 on).
+
+So u returns to v, and with a stable theta2 the output to that of the linear loop. Nothing is promised of a run that
+needs more, and nothing where v_s itself reaches the limits. k and k_c are found, at times and frequencies that are
+refined around their extremes; no bound is put on what lies between. A multiplier m > 0 in Popov's condition is for a
+dead zone that does not vary with time: it promises nothing under a reference. With another true plant v and v_s are
+those of its own linear loop, and theta1~ is what :func:`design.anti_windup.popov.robust_loss` makes of it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from experiments.engine.saturated_loop import SaturatedLoop
+from experiments.engine.simulate import Run, simulate
+from experiments.runs.guarantee import Guarantee, sector_text
+from experiments.runs.references import Reference, SampledReference
+from experiments.runs.steady_control import response
+from identification.base.digits import told_apart
+from identification.model.plant import PlantModel
+
+A_EXCURSION = 64  # samples of u between two crossings of the limits, at least
+A_TIME_CONSTANT = 10  # samples of u beyond the limits in the loop's shortest time constant
+REFINEMENTS = 8  # of the samples around the largest u and secant, and around where the guarantee is left
+A_REFINEMENT = 33  # samples of each, in place of three
+CONVERGED = 1e-12
+A_PERIOD = 200  # samples of v_s in a period of the reference
+MOST_SAMPLES = 1e6
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a run needs, beside what is guaranteed.
+
+    Parameters
+    ----------
+    guarantee
+        Of the run's design and anti-windup.
+    largest_control, largest_control_at_s
+        U, the largest |u|, and when; of a run that never saturates, among its own times.
+    largest_steady
+        V, the most that |v_s| reaches.
+    limit
+        L, the nearer of the limits.
+    needed_sector, needed_at_s
+        The largest secant from v_s, and when; 0 for a run that never saturates, 1 where v_s reaches a limit.
+    left_at_s
+        When the run first needed more than is guaranteed; NaN: never.
+    """
+
+    guarantee: Guarantee
+    largest_control: float
+    largest_control_at_s: float
+    largest_steady: float
+    limit: float
+    needed_sector: float
+    needed_at_s: float
+    left_at_s: float
+
+    @property
+    def covered(self) -> bool:
+        """Whether the guarantee speaks of the run."""
+        return self.needed_sector < self.guarantee.sector
+
+    @property
+    def covered_control(self) -> float:
+        """The most that |u| may reach wherever v_s is: U in (U - L)/(U - V) = k_c."""
+        k = self.guarantee.sector
+        if self.largest_steady >= self.limit:
+            return self.limit
+        return math.inf if k >= 1 else (self.limit - k * self.largest_steady) / (1 - k)
+
+    def agrees(self, other: Verdict) -> bool:
+        """Whether both have the same largest |u| and needed sector, to rounding."""
+        own, others = (np.array([each.largest_control, each.needed_sector]) for each in (self, other))
+        return bool(np.all(np.abs(own - others) <= CONVERGED * np.abs(own)))
+
+    @property
+    def needs(self) -> str:
+        """What the run needs beside what is guaranteed and covered."""
+        needed, guaranteed = told_apart(self.needed_sector, self.guarantee.sector, 3, sector_text)
+        reached, most = told_apart(self.largest_control, self.covered_control, 3, _plain)
+        covered = f"up to {most}" if math.isfinite(self.covered_control) else "any size"
+        return (
+            f"the run needs the sector {needed} at t = {self.needed_at_s:.3g} s, {guaranteed} is guaranteed (|u| "
+            f"reached {reached}; {covered} is covered)"
+        )
+
+    def __str__(self) -> str:
+        """In words; empty for a run that never saturates, of which nothing need be promised."""
+        if self.needed_sector == 0:
+            return ""
+        if self.guarantee.missing:
+            return f"No guarantee: {self.guarantee.missing}; |u| reached {self.largest_control:.3g}"
+        if self.covered:
+            return f"Covered by its guarantee: {self.needs}"
+        if self.largest_steady >= self.limit:
+            steady, limit = told_apart(self.largest_steady, self.limit, 4, _plain)
+            return (
+                f"NOT covered by its guarantee: the reference takes a control of {steady}, beyond the limit {limit}; "
+                f"|u| reached {self.largest_control:.3g}"
+            )
+        return f"NOT covered by its guarantee, which it left at t = {self.left_at_s:.3g} s: {self.needs}"
+
+
+def _plain(value: float, digits: int) -> str:
+    return f"{value:.{digits}g}"
+
+
+def steady_control(reference: Reference | SampledReference, plant: PlantModel, time_s: np.ndarray) -> np.ndarray:
+    """v_s, the control whose output is the reference once the linear loop has settled.
+
+    Parameters
+    ----------
+    reference
+        r(t); a sampled one ends as a constant, which takes no control of a plant that integrates.
+    plant
+        The true plant, with one integrator.
+    time_s
+        Shape (s,).
+
+    Returns
+    -------
+    ndarray, shape (s,)
+        The sinusoids over P(j omega), and slope/gain.
+    """
+    if isinstance(reference, SampledReference):
+        return np.zeros(len(time_s))
+    steady = np.full(len(time_s), reference.slope / plant.gain)
+    for amplitude, omega, phase in zip(reference.amplitudes, reference.omegas, reference.phases_rad, strict=True):
+        if omega > 0:
+            wave = response(plant, amplitude, omega, phase)
+            steady += wave.amplitude * np.sin(omega * (time_s + plant.delay_s) + wave.phase_rad)
+    return steady
+
+
+def needed_sector(control: np.ndarray, steady: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
+    """The secant (u - sat(u))/(u - v_s) of the dead zone, sample by sample; 1 where v_s is not within the limits.
+
+    Parameters
+    ----------
+    control, steady
+        u and v_s, shape (s,).
+    limits
+        (sigma_1, sigma_2), sigma_1 < sigma_2.
+
+    Returns
+    -------
+    ndarray, shape (s,)
+        From 0 to 1.
+    """
+    low, high = limits
+    beyond = control - np.clip(control, low, high)
+    away = np.where(beyond == 0, 1.0, control - steady)
+    inside = (low < steady) & (steady < high)
+    return np.where(inside, beyond / np.where(inside, away, 1.0), 1.0)
+
+
+def verdict(
+    given: Guarantee, time_s: np.ndarray, control: np.ndarray, steady: np.ndarray, limits: tuple[float, float]
+) -> Verdict:
+    """Judge a run by its samples.
+
+    Parameters
+    ----------
+    given
+        See :func:`experiments.runs.guarantee.guarantee`.
+    time_s, control, steady
+        Times and there u and v_s, shape (s,). What lies between the samples is not seen: the needed sector and the
+        largest |u| are those of the samples.
+    limits
+        (sigma_1, sigma_2).
+    """
+    low, high = limits
+    never = bool(np.all((low <= control) & (control <= high)))
+    needed = np.zeros(len(time_s)) if never else needed_sector(control, steady, limits)
+    at, largest = int(np.argmax(needed)), int(np.argmax(np.abs(control)))
+    left = np.flatnonzero(needed >= given.sector)
+    return Verdict(
+        guarantee=given,
+        largest_control=float(abs(control[largest])),
+        largest_control_at_s=float(time_s[largest]),
+        largest_steady=float(np.abs(steady).max()),
+        limit=min(-low, high),
+        needed_sector=float(needed[at]),
+        needed_at_s=float(time_s[at]),
+        left_at_s=float(time_s[left[0]]) if len(left) else math.nan,
+    )
+
+
+def judge_run(
+    given: Guarantee,
+    loop: SaturatedLoop,
+    limits: tuple[float, float],
+    run: Run,
+    reference: Reference | SampledReference,
+    plant: PlantModel,
+) -> Verdict:
+    """Judge a simulated run by u at its own times and, :func:`finely`, between them.
+
+    Parameters
+    ----------
+    given
+        See :func:`experiments.runs.guarantee.guarantee`.
+    loop, limits
+        What was simulated.
+    run
+        What :func:`experiments.engine.simulate.simulate` made of it, its first time 0.
+    reference, plant
+        r(t) and the true plant.
+    """
+    time_s, control = run.time_s, run.control
+    found = verdict(given, time_s, control, steady_control(reference, plant, time_s), limits)
+    if not len(run.events_s) and control[0] == run.saturated_control[0]:
+        return found
+    only_u = replace(loop, outputs={})
+    more = finely(loop, run, reference)
+    for _ in range(REFINEMENTS):
+        time_s, first = np.unique(np.append(time_s, more), return_index=True)
+        control = np.append(control, simulate(only_u, limits, more).control)[first]
+        before, found = found, verdict(given, time_s, control, steady_control(reference, plant, time_s), limits)
+        if found.agrees(before):
+            break
+        at = np.searchsorted(time_s, [found.largest_control_at_s, found.needed_at_s, found.left_at_s])
+        around = time_s[np.clip(np.add.outer([-1, 1], at), 0, len(time_s) - 1)]
+        more = np.unique(np.linspace(around[0], around[1], A_REFINEMENT))
+    return found
+
+
+def finely(loop: SaturatedLoop, run: Run, reference: Reference | SampledReference) -> np.ndarray:
+    """Times at which u shows how far it goes beyond the limits, and v_s how near it comes to them.
+
+    Returns
+    -------
+    ndarray, shape (s,)
+        From each crossing that leads out of the limits to the next one, and before the first one, A_EXCURSION times at
+        least and A_TIME_CONSTANT in the time constant of the fastest root of the loop; and A_PERIOD in each period of
+        the reference's fastest sinusoid. About MOST_SAMPLES at most of either.
+    """
+    end = float(run.time_s[-1])
+    edges = np.concatenate([[0.0], run.events_s, [end]])
+    out = np.concatenate([[True], run.modes != 0]) & (edges[1:] > edges[:-1])
+    starts, ends = edges[:-1][out], edges[1:][out]
+    roots = np.concatenate([np.linalg.eigvals(loop.A), np.linalg.eigvals(loop.A + np.outer(loop.B, loop.C))])
+    rate = min(A_TIME_CONSTANT * float(np.abs(roots).max()), MOST_SAMPLES / end)
+    counts = np.maximum(np.ceil((ends - starts) * rate).astype(int), A_EXCURSION)
+    fastest = 0.0 if isinstance(reference, SampledReference) else max(reference.omegas) / (2 * math.pi)
+    periods = np.linspace(0.0, end, round(min(A_PERIOD * fastest * end, MOST_SAMPLES)) + 2)
+    spans = [np.linspace(*span) for span in zip(starts, ends, counts, strict=True)]
+    return np.unique(np.concatenate([periods, *spans]))

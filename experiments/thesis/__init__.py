@@ -1,0 +1,1 @@
+"""Thesis: what reproduces and judges the print."""

@@ -1,0 +1,1 @@
+"""Thesis: the ledger of printed statements, each recomputed."""

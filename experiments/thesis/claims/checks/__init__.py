@@ -1,0 +1,1 @@
+"""Thesis: the functions that recompute the ledger's rows."""

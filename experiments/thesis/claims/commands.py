@@ -1,0 +1,90 @@
+"""The commands about the thesis's text: ``claims``, ``coverage`` and ``equations``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from experiments.tables import csv_writer
+from identification.base.errors import InputError
+from identification.base.files import read_text, write_whole
+
+PAGE = click.Path(path_type=Path, dir_okay=False)
+
+
+@click.command("claims")
+@click.option(
+    "--output", type=click.Path(path_type=Path, file_okay=False), required=True, help="Existing folder for claims.csv."
+)
+@click.option("--page", type=PAGE, help="Markdown file to write the page to.")
+def claims_command(output: Path, page: Path | None) -> None:
+    """What the thesis claims, computed again: claims.csv, and a page to read."""
+    from experiments.thesis.claims.coverage import EXCEPTIONS, RECORD, quotes_sha256, read_exceptions, read_record
+    from experiments.thesis.claims.ledger import LEDGER, read_ledger, recompute
+    from experiments.thesis.claims.page import claims_page
+
+    if not output.is_dir():
+        raise InputError(f"{output}: no such folder")
+    ledger, record = read_ledger(), read_record()
+    counted = record["ledger_sha256"] == quotes_sha256(ledger, read_exceptions())
+    table = recompute(ledger)
+    path = output / "claims.csv"
+    writers: dict[Path, Callable[[Path], object]] = {path: csv_writer(table)}
+    if page:
+        writers[page] = _text_writer(claims_page(table, record, counted))
+    write_whole(writers, [LEDGER, RECORD, EXCEPTIONS])
+    click.echo(f"{len(table)} claims -> {path}")
+    for verdict, count in table["verdict"].value_counts().items():
+        click.echo(f"  {verdict:17s}{count:4d}")
+    for row in table[table["verdict"] != table["status"]].itertuples():
+        click.echo(f"  {row.id}: the ledger says {row.status}, recomputed it {row.verdict}")
+
+
+@click.command("coverage")
+@click.argument("text", type=PAGE)
+@click.option("--record", type=PAGE, help="JSON file to keep the counts in.")
+def coverage_command(text: Path, record: Path | None) -> None:
+    """List the numbers in the thesis's TEXT that no claim quotes; exit status 1 if there is one, or a quote is not."""
+    from experiments.thesis.claims.coverage import (
+        EXCEPTIONS,
+        LEFT,
+        coverage,
+        coverage_record,
+        quotes_missing_from,
+        read_exceptions,
+    )
+    from experiments.thesis.claims.ledger import LEDGER, read_ledger
+
+    content, ledger, exceptions = read_text(text), read_ledger(), read_exceptions()
+    covered = coverage(content, ledger, exceptions)
+    counts = coverage_record(content, covered, ledger, exceptions)
+    if record:
+        write_whole({record: _text_writer(json.dumps(counts, indent=2) + "\n")}, [text, LEDGER, EXCEPTIONS])
+    click.echo(f"{text}: {counts['numbers']} numbers")
+    for status, count in counts["statuses"].items():
+        click.echo(f"  {status:17s}{count:4d}")
+    left, missing = covered[covered["status"] == LEFT], quotes_missing_from(content, ledger)
+    for row in left.itertuples():
+        click.echo(f"line {row.line}: {row.number} is quoted by no claim: {row.context}")
+    for claim in missing:
+        click.echo(f"{claim}: its quote does not stand in the text")
+    if len(left) or missing:
+        raise SystemExit(1)
+
+
+@click.command("equations")
+@click.option("--page", type=PAGE, required=True, help="Markdown file to write the page to.")
+def equations_command(page: Path) -> None:
+    """Each equation, lemma, theorem, table and figure of the thesis with its function and its test, as a page."""
+    from experiments.thesis.claims.equations_page import EQUATIONS, equations_page, read_equations
+
+    table = read_equations()
+    write_whole({page: _text_writer(equations_page(table))}, [EQUATIONS])
+    click.echo(f"{len(table)} labels -> {page}")
+
+
+def _text_writer(text: str) -> Callable[[Path], object]:
+    return lambda partial: partial.write_text(text, encoding="utf-8")

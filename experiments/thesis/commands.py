@@ -1,0 +1,178 @@
+"""The group ``thesis``: one command for each of the thesis's experiments, under its references and limits.
+
+What takes long to import, and only one command needs, that command imports.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from tqdm import tqdm
+
+from data.thesis import model_named
+from design.design_file import Design, read_design
+from experiments.campaign.command import plant_options, run_campaign
+from experiments.options import DESIGN, OUTPUT_FOLDER, positive_limit
+from experiments.tables import write_into
+from experiments.thesis.claims.commands import claims_command, coverage_command, equations_command
+from experiments.thesis.printed_choices import thesis_reference
+from identification.base.errors import InputError
+
+LIMIT = click.option("--limit", type=float, help="Saturation limits +-LIMIT, instead of the thesis's.")
+
+
+@click.group("thesis")
+def thesis() -> None:
+    """Reproduce and judge the print: its experiments, claims and equations."""
+
+
+thesis.add_command(claims_command)
+thesis.add_command(coverage_command)
+thesis.add_command(equations_command)
+
+
+@thesis.command("pid")
+@OUTPUT_FOLDER
+def pid(output: Path) -> None:
+    """The PID benchmark of section 2.2: pid.csv, pid_summary.csv."""
+    from experiments.thesis.studies.pid import pid_tables
+
+    write_into(output, pid_tables())
+
+
+@thesis.command("f-gamma")
+@DESIGN
+@OUTPUT_FOLDER
+def f_gamma(design: Path, output: Path) -> None:
+    """The parameter study of f(gamma) for the bound of DESIGN: f_gamma.csv, f_gamma_summary.csv."""
+    from experiments.thesis.studies.f_gamma import f_gamma_tables
+
+    write_into(output, f_gamma_tables(read_design(design).additive_bound))
+
+
+@thesis.command("trade-off")
+@DESIGN
+@OUTPUT_FOLDER
+def trade_off(design: Path, output: Path) -> None:
+    """f of the corrected anti-windup over recovery time and sector: trade_off.csv, trade_off_summary.csv."""
+    from experiments.thesis.studies.trade_off import RECOVERIES, SECTORS, trade_off_tables
+
+    content = read_design(design)
+    with tqdm(total=len(SECTORS) * RECOVERIES, desc="trade-off", disable=None, leave=False) as bar:
+        write_into(output, trade_off_tables(content, bar.update))
+
+
+@thesis.command("interpolation")
+@DESIGN
+@OUTPUT_FOLDER
+def interpolation(design: Path, output: Path) -> None:
+    """Where each design of Q works: interpolation.csv, interpolation_map.csv, interpolation_summary.csv."""
+    from experiments.thesis.studies.interpolation import interpolation_tables
+
+    write_into(output, interpolation_tables(_of_kind(design, "extended")))
+
+
+@thesis.command("robustness")
+@click.argument("designs", metavar="DESIGN...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@OUTPUT_FOLDER
+def robustness(designs: tuple[Path, ...], output: Path) -> None:
+    """|W_a C S| and the margins of each DESIGN, named by its file: robustness.csv, robustness_summary.csv."""
+    from experiments.thesis.studies.robustness import robustness_tables
+
+    names = [path.stem for path in designs]
+    if len(set(names)) < len(names):
+        raise InputError(f"two of the designs are named {max(names, key=names.count)}; expected different file names")
+    write_into(output, robustness_tables({name: read_design(path) for name, path in zip(names, designs, strict=True)}))
+
+
+@thesis.command("delay-free")
+@DESIGN
+@LIMIT
+@OUTPUT_FOLDER
+def delay_free(design: Path, limit: float | None, output: Path) -> None:
+    """The chapter 2 loop: delay_free.csv, delay_free_summary.csv."""
+    from experiments.thesis.studies.chapter_2 import delay_free_tables
+
+    write_into(output, delay_free_tables(_of_kind(design, "delay-free"), positive_limit(limit)))
+
+
+@thesis.command("extended")
+@DESIGN
+@LIMIT
+@OUTPUT_FOLDER
+def extended(design: Path, limit: float | None, output: Path) -> None:
+    """The chapter 4 loop: extended.csv, extended_summary.csv."""
+    from experiments.thesis.studies.chapter_4 import extended_tables
+
+    write_into(output, extended_tables(_of_kind(design, "extended"), positive_limit(limit)))
+
+
+@thesis.command("limits")
+@DESIGN
+@OUTPUT_FOLDER
+def limits(design: Path, output: Path) -> None:
+    """What no controller of DESIGN's plant can better: limits_KIND.csv, limits_KIND_summary.csv."""
+    from experiments.physical_limits.least_peak_error import limits_tables
+    from experiments.thesis.studies.conditions import several_limits
+
+    content = read_design(design)
+    reference = thesis_reference(content.kind, content.reference_omegas)
+    with tqdm(desc="limits", unit="", disable=None, leave=False) as bar:
+        write_into(output, limits_tables(content, reference, several_limits(content), bar.update))
+
+
+@thesis.command("conditions")
+@OUTPUT_FOLDER
+def conditions(output: Path) -> None:
+    """What the thesis does not print, searched by what it does: conditions.csv, conditions_summary.csv."""
+    from experiments.thesis.unprinted.search import conditions_tables
+
+    if not output.is_dir():
+        raise InputError(f"{output}: no such folder")
+    with tqdm(desc="conditions", unit="", disable=None, leave=False) as bar:
+        write_into(output, conditions_tables(tick=bar.update))
+
+
+@thesis.command("sampled-rates")
+@DESIGN
+@LIMIT
+@OUTPUT_FOLDER
+def sampled_rates(design: Path, limit: float | None, output: Path) -> None:
+    """The chapter 4 loop on a computer with a real drive, over its rate: sampled.csv, sampled_summary.csv."""
+    from experiments.thesis.studies.sampled_rates import sampled_rates_tables
+
+    write_into(output, sampled_rates_tables(_of_kind(design, "extended"), positive_limit(limit)))
+
+
+@thesis.command("campaign")
+@plant_options
+@LIMIT
+def campaign(design: Path, plants: int, seed: int, scheduler: str | None, output: Path, limit: float | None) -> None:
+    """Run DESIGN with plants drawn inside W_a, as the command campaign does."""
+    from experiments.thesis.studies.conditions import usual_limit, usual_periods
+
+    content = read_design(design)
+    given = positive_limit(limit)
+    limit = usual_limit(content) if given is None else given
+    reference = thesis_reference(content.kind, content.reference_omegas)
+    run_campaign(content, design, plants, seed, reference, limit, usual_periods(content), scheduler, output)
+
+
+@thesis.command("additive-error")
+@click.argument("model")
+@click.argument("sweeps", nargs=-1, required=True, type=click.Path(path_type=Path))
+@OUTPUT_FOLDER
+def additive_error(model: str, sweeps: tuple[Path, ...], output: Path) -> None:
+    """The additive error of SWEEPS against MODEL: additive_error.csv, additive_error_summary.csv."""
+    from experiments.thesis.studies.additive_error import additive_error_tables
+    from identification.sweeps.read_sweeps import read_sweeps
+
+    write_into(output, additive_error_tables(model_named(model), read_sweeps(sweeps)))
+
+
+def _of_kind(path: Path, kind: str) -> Design:
+    design = read_design(path)
+    if design.kind != kind:
+        raise InputError(f"{path}: kind is '{design.kind}'; expected '{kind}'")
+    return design

@@ -1,0 +1,1 @@
+"""Thesis: the tables behind the figures."""

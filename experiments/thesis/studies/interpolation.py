@@ -1,0 +1,91 @@
+"""Where each of the three designs of Q works (Fig. A.2), which section 4.2 says in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+
+from design.blocks.frequency_peak import peak
+from design.chapters_3_4.interpolate_Q import Conditions, StableFunction, by_poles, by_zeros, conditions, lagrange
+from design.chapters_3_4.smith_predictor import free_part
+from design.design_file import Design
+from identification.base.errors import InputError
+from identification.model.model_file import number
+
+FREQUENCIES = 161
+SENSITIVITY = 2.0  # ||S|| above it, a modulus margin below 1/2, counts as a failure
+METHODS: dict[str, Callable[[Conditions], StableFunction]] = {
+    "zeros": lambda wanted: by_zeros(wanted, [(2 * omega, omega**2) for omega in wanted.omegas]),
+    "lagrange": lagrange,
+    "poles": by_poles,
+}
+"""Each method at one frequency; the zeros design with both poles of Q at -omega, so that it scales with omega."""
+
+
+def interpolation_tables(design: Design) -> dict[str, pd.DataFrame]:
+    """The three designs of Q over the frequency of the reference, and where the poles design is stable at all.
+
+    Parameters
+    ----------
+    design
+        Of kind "extended"; its a and its plant's dead time count.
+
+    Returns
+    -------
+    dict
+        ``interpolation``: omega (rad/s), method, stable, outer (C_0 has no zero in the closed right half plane, the
+        proviso of (3.19)), sensitivity (||S||, empty where Q is not stable), works (all three, ||S|| <= 2).
+        ``interpolation_summary``: method, lowest and highest omega of each range in which it works (empty: nowhere),
+        a, delay_s. ``interpolation_map``: omega_delay, a_delay, stable: whether the poles design gives a stable Q
+        depends on omega T_d and a T_d only.
+    """
+    if design.kind != "extended":
+        raise InputError(f"the design is '{design.kind}'; expected 'extended'")
+    a, delay_s = number(design.parameters, "a"), design.plant.delay_s
+    top = max(100 * a, 3 * math.pi / delay_s if delay_s else 0.0)
+    rows = [
+        {"omega": omega, "method": name} | _judge(method, float(omega), delay_s, a)
+        for omega in np.geomspace(a / 40, top, FREQUENCIES)
+        for name, method in METHODS.items()
+    ]
+    table = pd.DataFrame(rows)
+    summary = []
+    for name in METHODS:
+        part = table[table["method"] == name]
+        works = part["works"].to_numpy() == 1
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], works, [0]])))
+        ends = [(part["omega"].iloc[first], part["omega"].iloc[last - 1]) for first, last in edges.reshape(-1, 2)]
+        for lowest, highest in ends or [(np.nan, np.nan)]:
+            summary.append({"method": name, "lowest": lowest, "highest": highest, "a": a, "delay_s": delay_s})
+    products = [(x, y) for y in np.geomspace(1e-3, 10, 61) for x in np.geomspace(1e-2, 20, 151)]
+    stable = [_poles_are_stable(x, y) for x, y in products]
+    return {
+        "interpolation": table,
+        "interpolation_summary": pd.DataFrame(summary),
+        "interpolation_map": pd.DataFrame(products, columns=["omega_delay", "a_delay"]).assign(stable=stable),
+    }
+
+
+def _judge(method: Callable[[Conditions], StableFunction], omega: float, delay_s: float, a: float) -> dict[str, float]:
+    try:
+        free = free_part(method(conditions([omega], delay_s, a)), a)
+    except InputError:
+        return {"stable": 0, "outer": 0, "sensitivity": np.nan, "works": 0}
+    T = free.T_so
+    # the dead time turns T_so exp(-T_d s) once each 2 pi/T_d: roots there make the grid fine enough
+    turns = tuple(-k / delay_s + 1j * k * math.pi / delay_s for k in (0.5, 1, 2, 4, 8)) if delay_s else ()
+    sensitivity, _ = peak(lambda at: np.abs(1 - T(1j * at) * np.exp(-1j * at * delay_s)), (*T.zeros, *T.poles, *turns))
+    outer = all(zero.real < 0 for zero in free.C_0.zeros)
+    works = outer and sensitivity <= SENSITIVITY
+    return {"stable": 1, "outer": int(outer), "sensitivity": sensitivity, "works": int(works)}
+
+
+def _poles_are_stable(omega_delay: float, a_delay: float) -> int:
+    try:
+        by_poles(conditions([omega_delay], 1.0, a_delay))
+    except InputError:
+        return 0
+    return 1

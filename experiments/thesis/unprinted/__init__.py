@@ -1,0 +1,1 @@
+"""Thesis: searches for the conditions that the thesis does not print."""

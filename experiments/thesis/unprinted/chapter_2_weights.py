@@ -1,0 +1,264 @@
+"""The search for what chapter 2 does not print, its weights and its initial output, by its printed tracking error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import brentq
+
+from data.thesis import printed
+from design.blocks.block import Block
+from design.design_file import Design
+from design.hinf.mixed_sensitivity import SynthesisError, mixed_sensitivity
+from experiments.engine.saturated_loop import SaturatedLoop
+from experiments.physical_limits.integrator_bound import least_peak_error
+from experiments.runs.batch import Tick, threaded
+from experiments.runs.compare_anti_windups import run_all
+from experiments.runs.design_loop import design_loop
+from experiments.runs.metrics import over_last
+from experiments.runs.references import Reference
+from experiments.thesis.printed_choices import chapter_2, thesis_reference
+from experiments.thesis.studies.chapter_2 import PERIODS
+from experiments.thesis.unprinted.chapter_4_conditions import starting_at
+from experiments.thesis.unprinted.printed_outcomes import Found, compared, printed_outcomes, where_met
+from identification.base.errors import InputError
+
+SAMPLES_PER_PERIOD = 500
+OUTCOME = "delay_free_error"
+READINGS = {"peak_percent": 1.0, "ripple_percent": 1.0, "peak_share": 1.0, "peak": 1.0}
+"""What "0.098 % tracking error" may mean, all ours, of the last period: see :func:`errors`."""
+
+
+class Weights(NamedTuple):
+    """Factors on the choices of :mod:`design.delay_free` that change K.
+
+    Parameters
+    ----------
+    decay
+        On the decay rate asked of the closed loop.
+    damping
+        On the real parts of the poles of W1, its value at zero held.
+    level
+        On W2; on W1 it would do the inverse.
+    corner
+        On the zero of W2 that is W_a's, its value at zero held.
+    """
+
+    decay: float = 1.0
+    damping: float = 1.0
+    level: float = 1.0
+    corner: float = 1.0
+
+    def __str__(self) -> str:
+        changed = [f"{name} x {factor:g}" for name, factor in self._asdict().items() if factor != 1.0]
+        return ", ".join(changed) or "usual"
+
+
+USUAL = Weights()
+
+
+def usual_weights() -> tuple[Weights, ...]:
+    """Each choice over more than a decade, the others as usual, and corners of the box of all four."""
+    singles = [
+        *(Weights(decay=factor) for factor in (0.03, 0.1, 0.3, 1.9)),
+        *(Weights(damping=factor) for factor in (0.6, 2.0, 5.0, 10.0)),
+        *(Weights(level=factor) for factor in (0.01, 0.1, 0.3, 3.0, 10.0, 100.0)),
+        *(Weights(corner=factor) for factor in (0.1, 0.3, 3.0, 10.0)),
+    ]
+    return (
+        USUAL,
+        *singles,
+        *(Weights(*factors) for factors in product((0.1, 1.0), (5.0,), (0.1, 10.0), (0.1, 10.0))),
+    )
+
+
+def usual_limits() -> np.ndarray:
+    """Limits as multiples of the input that the reference takes, crowding towards it from below."""
+    return np.concatenate([1 - np.geomspace(0.3, 1e-3, 32), np.linspace(1.0, 1.6, 13)])
+
+
+def with_weights(design: Design, weights: Weights) -> Design:
+    """The design with the stabiliser K for other weights.
+
+    Raises
+    ------
+    InputError, SynthesisError
+        See :func:`design.hinf.mixed_sensitivity.mixed_sensitivity`.
+    """
+    assert design.hinf is not None
+    W1, W2, decay_rate = (design.hinf[name] for name in ("W1", "W2", "decay_rate"))
+    damped = tuple(complex(weights.damping * pole.real, pole.imag) for pole in W1.poles)
+    flat = float(np.prod(np.abs(damped)) / np.prod(np.abs(W1.poles)))
+    corner = -design.additive_bound.corner
+    moved = tuple(weights.corner * zero if abs(zero - corner) < 1e-9 * abs(corner) else zero for zero in W2.zeros)
+    synthesis = mixed_sensitivity(
+        design.blocks["G_A"],
+        Block(W1.gain * flat, (), damped),
+        Block(W2.gain * weights.level / weights.corner, moved, W2.poles),
+        weights.decay * decay_rate,
+    )
+    return replace(design, blocks={**design.blocks, "K": synthesis.K})
+
+
+class Loop(NamedTuple):
+    """Chapter 2's loop with the thesis's anti-windup, from y(0) = 0.
+
+    Parameters
+    ----------
+    design, loop, reference
+        What it is made of.
+    """
+
+    design: Design
+    loop: SaturatedLoop
+    reference: Reference
+
+
+def loop_of(design: Design) -> Loop:
+    """The loop of a design."""
+    reference = thesis_reference(design.kind, design.reference_omegas)
+    loop = design_loop(design, reference, design.compensator("thesis"))
+    return Loop(design, replace(loop, outputs={"error": loop.outputs["error"]}), reference)
+
+
+def errors(of: Loop, limit: float, output: float) -> dict[str, float]:
+    """The error of the last of six periods under +-limit from y(0) = ``output``.
+
+    Returns
+    -------
+    dict
+        ``peak``, the largest |e| in the unit of the output; ``peak_percent`` and ``peak_share``, the same in percent of
+        the reference's amplitude and as a share of it; ``ripple_percent``, half the distance of the extremes, in
+        percent; ``offset``, their middle. NaN when the loop diverges.
+    """
+    period, amplitude = of.reference.period_s, of.reference.amplitude
+    time_s = np.linspace(0.0, PERIODS * period, PERIODS * SAMPLES_PER_PERIOD + 1)
+    run = run_all({"run": starting_at(of.loop, of.design, output)}, limit, time_s)["run"]
+    offset, ripple = over_last(time_s, run.outputs["error"], period)
+    peak = abs(offset) + ripple
+    shares = {"peak_percent": 100 * peak / amplitude, "peak_share": peak / amplitude}
+    return {"peak": peak, **shares, "ripple_percent": 100 * ripple / amplitude, "offset": offset}
+
+
+def offset_free_output(of: Loop, limit: float) -> float:
+    """The initial output, nearer to r(0) than half the amplitude, from which the error keeps no offset.
+
+    r(0) itself when there is none, or the loop diverges.
+    """
+    start, reach = float(of.reference(np.array(0.0))), of.reference.amplitude / 2
+
+    def offset(output: float) -> float:
+        return errors(of, limit, output)["offset"]
+
+    with suppress(ValueError):  # no change of sign, or NaN
+        start = float(brentq(offset, start - reach, start + reach, xtol=1e-3))
+    return start
+
+
+def delay_free_scan(
+    sets: Sequence[str],
+    limits: np.ndarray | None = None,
+    weights: Sequence[Weights] | None = None,
+    tick: Tick = lambda: None,
+) -> pd.DataFrame:
+    """The error over the limit, and over the weights at the printed limit.
+
+    Parameters
+    ----------
+    sets
+        Parameter sets.
+    limits, weights
+        :func:`usual_limits` and :func:`usual_weights` unless given.
+
+    Returns
+    -------
+    DataFrame
+        set, delay ("none": the chapter leaves it out), required, initial_output, limit, weights, and the columns of
+        :func:`errors`. With the usual weights over the limits, from y(0) = 0, which is r(0), and from the mean of r;
+        then, at the printed limit, for each choice of weights from r(0) and from :func:`offset_free_output`. What the
+        synthesis refuses is left out.
+    """
+    limits = usual_limits() if limits is None else limits
+    weights = usual_weights() if weights is None else weights
+    usual = {name: loop_of(chapter_2(name)) for name in sets}
+    jobs = [
+        (name, float(share * of.reference.required(of.design.loop_plant).value), output)
+        for name, of in usual.items()
+        for output in (0.0, of.reference.offset)
+        for share in limits
+    ]
+    rows = threaded(lambda job: _row(job[0], usual[job[0]], USUAL, job[1], job[2]), jobs, tick)
+    limit = printed()["delay_free"]["limit"]
+
+    varied: list[tuple[str, Loop, Weights]] = []
+    for name, choice in product(sets, weights):  # one by one: the synthesis turns warnings into errors, for all threads
+        with suppress(InputError, SynthesisError):
+            varied.append((name, loop_of(with_weights(usual[name].design, choice)), choice))
+
+    def both(job: tuple[str, Loop, Weights]) -> list[dict[str, object]]:
+        name, of, choice = job
+        outputs = float(of.reference(np.array(0.0))), offset_free_output(of, limit)
+        return [_row(name, of, choice, limit, output) for output in outputs]
+
+    for several in threaded(both, varied, tick):
+        rows += several
+    return pd.DataFrame(rows)
+
+
+def _row(name: str, of: Loop, weights: Weights, limit: float, output: float) -> dict[str, object]:
+    head = {"set": name, "delay": "none", "required": of.reference.required(of.design.loop_plant).value}
+    return head | {"initial_output": output, "limit": limit, "weights": str(weights)} | errors(of, limit, output)
+
+
+def delay_free_rows(sets: Sequence[str], scan: pd.DataFrame, tick: Tick = lambda: None) -> pd.DataFrame:
+    """What the printed tracking error of chapter 2 needs.
+
+    Parameters
+    ----------
+    sets
+        Parameter sets.
+    scan
+        Of :func:`delay_free_scan`.
+
+    Returns
+    -------
+    DataFrame
+        The columns of :func:`experiments.thesis.unprinted.search.alone`, ``search`` and ``weights``. Rows "alone": the
+        limits that give the number in each reading, with the usual weights, from both initial outputs. Rows
+        "weights", reading "peak_percent": the least error at the printed limit. Rows "any controller": the lower
+        bound of :func:`experiments.physical_limits.integrator_bound.least_peak_error` there.
+    """
+    limit, rows = printed()["delay_free"]["limit"], []
+    number = printed_outcomes()[OUTCOME]
+    head = {"outcome": OUTCOME, "delay": "none"}
+    for name in sets:
+        of, own = loop_of(chapter_2(name)), scan[scan["set"] == name]
+        over_limits = own[own["weights"] == str(USUAL)].drop_duplicates(["initial_output", "limit"])
+        over_limits = over_limits.groupby("initial_output").filter(lambda group: len(group) > 2).sort_values("limit")
+        for output, group in over_limits.groupby("initial_output"):
+            start = float(str(output))
+            for reading in READINGS:
+                found = where_met(_reading(of, start, reading), list(group["limit"]), list(group[reading]), number)
+                said = {"search": "alone", "reading": reading, "set": name, "initial_output": start}
+                rows += [head | said | {"weights": str(USUAL)} | compared(OUTCOME, one) for one in found]
+                tick()
+        best = own[own["limit"] == limit].nsmallest(1, "peak_percent").iloc[0]
+        least = Found(math.nan, math.nan, limit, float(best["peak_percent"]))
+        said = {"search": "weights", "reading": "peak_percent", "set": name, "initial_output": best["initial_output"]}
+        rows.append(head | said | {"weights": best["weights"]} | compared(OUTCOME, least))
+        plant, (omega,) = of.design.loop_plant, of.reference.omegas
+        bound = 100 * least_peak_error(plant, limit, of.reference.amplitude, omega) / of.reference.amplitude
+        said = {"search": "any controller", "reading": "peak_percent", "set": name, "initial_output": math.nan}
+        rows.append(head | said | {"weights": "any"} | compared(OUTCOME, Found(math.nan, math.nan, limit, bound)))
+    return pd.DataFrame(rows)
+
+
+def _reading(of: Loop, output: float, reading: str) -> Callable[[float], float]:
+    return lambda limit: errors(of, limit, output)[reading]

@@ -1,0 +1,133 @@
+"""The loop of chapter 4 under any limit from any initial output, and what it comes to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from design.blocks.block import plant_block
+from design.blocks.state_space import realize
+from design.design_file import Design
+from experiments.engine.pade import with_pade
+from experiments.engine.saturated_loop import SaturatedLoop
+from experiments.runs.compare_anti_windups import run_all
+from experiments.runs.design_loop import design_loop
+from experiments.runs.references import Reference
+from experiments.thesis.printed_choices import chapter_4, thesis_reference
+from experiments.thesis.studies.chapter_4 import PADE_ORDER, PERIODS
+from experiments.thesis.unprinted.printed_outcomes import with_anti_windup, without_anti_windup
+
+SETS = ("implied", "table")
+DELAYS = ("exact", "pade")
+SAMPLES_PER_PERIOD = 500
+
+
+class Point(NamedTuple):
+    """A limit +-limit of the actuator, in its unit, and y(0), in the unit of the plant's output."""
+
+    limit: float
+    output: float
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Chapter 4's loop under one parameter set, with the exact dead time or its approximation.
+
+    Parameters
+    ----------
+    set_name
+        One of :data:`SETS`.
+    delay
+        "exact", or "pade": every dead time replaced by its second-order Pade approximation, as section 4.2 does.
+    """
+
+    set_name: str
+    delay: str
+
+    @cached_property
+    def design(self) -> Design:
+        """Chapter 4's."""
+        return chapter_4(self.set_name)
+
+    @cached_property
+    def reference(self) -> Reference:
+        """r(t) = 50 sin(1.5 t + pi/2)."""
+        return thesis_reference("extended", self.design.reference_omegas)
+
+    @cached_property
+    def required(self) -> float:
+        """The most that the input of perfect tracking reaches, in the actuator's unit."""
+        return self.reference.required(self.design.loop_plant).value
+
+    @property
+    def initial_reference(self) -> float:
+        """r(0) in the unit of the output."""
+        return float(self.reference(np.array(0.0)))
+
+    @cached_property
+    def _loops(self) -> dict[str, SaturatedLoop]:
+        kinds = {"none": None, "thesis": self.design.compensator("thesis")}
+        loops = {name: design_loop(self.design, self.reference, kind) for name, kind in kinds.items()}
+        return {name: replace(loop, outputs={"error": loop.outputs["error"]}) for name, loop in loops.items()}
+
+    def loop(self, kind: str, output: float) -> SaturatedLoop:
+        """The loop "none" (without anti-windup) or "thesis" (with the thesis's) from y(0) = ``output``, see
+        :func:`starting_at`."""
+        loop = starting_at(self._loops[kind], self.design, output)
+        return with_pade_at_rest(loop, PADE_ORDER) if self.delay == "pade" else loop
+
+    def outcomes(self, kind: str, point: Point, samples: int = SAMPLES_PER_PERIOD) -> dict[str, float]:
+        """What the loop of :meth:`loop` comes to in every reading, from so many samples of each of five periods.
+
+        NaN is never; all are NaN when the loop diverges.
+        """
+        period = self.reference.period_s
+        time_s = np.linspace(0.0, PERIODS * period, PERIODS * samples + 1)
+        loop = self.loop(kind, point.output)
+        run = run_all({kind: loop}, point.limit, time_s)[kind]
+        if kind == "none":
+            return without_anti_windup(run, period)
+        return with_anti_windup(run, self.reference.amplitude, period)
+
+    def both(self, point: Point, samples: int = SAMPLES_PER_PERIOD) -> dict[str, float]:
+        """The outcomes of both loops."""
+        return self.outcomes("none", point, samples) | self.outcomes("thesis", point, samples)
+
+
+def starting_at(loop: SaturatedLoop, design: Design, output: float) -> SaturatedLoop:
+    """The loop of a design from y(0) = ``output``, everything else at rest.
+
+    Parameters
+    ----------
+    loop
+        As :func:`experiments.runs.design_loop.design_loop` makes it of ``design``, without Pade approximations.
+    design
+        Its plant integrates.
+    output
+        In the unit of the plant's output.
+
+    Returns
+    -------
+    SaturatedLoop
+        The plant starts in the state that it keeps without input, A x = 0 and C x = ``output``: the integrator holds
+        it, the modes are at rest. Controller and anti-windup are at zero, and so is the input of the past, so that
+        y = ``output`` until the dead time is over.
+    """
+    P = realize(plant_block(design.loop_plant))
+    held = np.linalg.lstsq(np.vstack([P.A, P.C]), np.append(np.zeros(len(P.b)), output))[0]
+    held *= output / (P.C[0] @ held) if output else 0.0
+    first = len(thesis_reference(design.kind, design.reference_omegas).generator().start)
+    x0 = loop.x0.copy()
+    x0[first : first + len(held)] = held
+    return replace(loop, x0=x0)
+
+
+def with_pade_at_rest(loop: SaturatedLoop, order: int) -> SaturatedLoop:
+    """:func:`experiments.engine.pade.with_pade`, the delayed signals having been for ever what they are at t = 0."""
+    padded, n = with_pade(loop, order), len(loop.x0)
+    x0 = padded.x0.copy()
+    x0[n:] = np.linalg.solve(padded.A[n:, n:], -padded.A[n:, :n] @ loop.x0)
+    return replace(padded, x0=x0)

@@ -1,0 +1,1 @@
+"""Tool: arrays, errors, files and the command line, which every wing uses."""

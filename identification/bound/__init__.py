@@ -1,0 +1,1 @@
+"""Tool: nominal plant and frequency responses -> the additive bound W_a."""

@@ -1,0 +1,263 @@
+"""Residuals of all tests -> the additive bound W_a that covers them, Thesis Eq. (2.21) and (2.22)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.base.arrays import Real
+from identification.base.errors import InputError
+from identification.bound.envelope import WIDTH, envelope_of
+from identification.bound.tightest_bound import Points, resonances, shares, tightest
+from identification.model.plant import AdditiveBound, PlantModel
+from identification.sweeps.response import FrequencyResponse
+
+HIGHEST_ORDER = 8
+GRID = 1000  # frequencies, equal in logarithm, that are looked at besides the lines
+ROUNDING = 1e-12  # of the plant: two models that differ by less do not differ
+MARGIN = 1e-9  # relative, so that rounding cannot uncover the line where the bound touches
+NEAR = 0.01  # share of a residual within which W_a touches it
+ZOOMS = 3  # into what is between the grid's frequencies where W_a is within PEAK of a fit's distance
+ZOOM = 33  # frequencies
+PEAK = 1e-3
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Where W_a is nearly as small as a residual.
+
+    Parameters
+    ----------
+    omega
+        In rad/s.
+    test
+        The name of the test whose residual it is.
+    between_lines
+        The residual is that of the test's own fit.
+    ratio
+        Of |W_a| over the residual, 1 or little more.
+    """
+
+    omega: float
+    test: str
+    between_lines: bool
+    ratio: float
+
+
+@dataclass(frozen=True)
+class Excess:
+    """|W_a| over an envelope, as ratios.
+
+    Parameters
+    ----------
+    largest, largest_omega
+        The largest, and where it is in rad/s.
+    mean
+        Geometric, with equal weight for equal log frequency.
+    """
+
+    largest: float
+    largest_omega: float
+    mean: float
+
+
+@dataclass(frozen=True)
+class BoundReport:
+    """W_a and how tight it is.
+
+    Parameters
+    ----------
+    bound
+        At least |P - test| at every line of every test, and at least the distance between P and the test's own fit
+        on a grid between the lines.
+    largest_excess, mean_excess
+        Of |W_a| over the envelope of all residuals, at the lines, at the frequencies between them where W_a is fitted,
+        and around its own modes.
+    least_excess
+        No W_a of this order that covers the residuals has a smaller largest excess, as multipliers prove in ball
+        arithmetic for the residuals and envelope as computed; 1 says nothing.
+    at_lines, between_lines
+        Over the envelope of the tests' residuals at their lines, and over that of their fits' distances between the
+        lines; the latter is None without fits, or when none differs from P.
+    touches
+        Where W_a is within NEAR of a residual, the closest first; of those within WIDTH in log frequency only the
+        closest.
+    """
+
+    bound: AdditiveBound
+    largest_excess: float
+    mean_excess: float
+    least_excess: float
+    at_lines: Excess
+    between_lines: Excess | None
+    touches: tuple[Touch, ...]
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """Residuals (M,) at frequencies (M,) in rad/s, and the number of the test that each belongs to."""
+
+    omega: Real
+    residual: Real
+    test: NDArray[np.intp]
+
+
+def bound_residuals(
+    plant: PlantModel,
+    tests: Sequence[FrequencyResponse],
+    models: Sequence[PlantModel] | None = None,
+    order: int = 2,
+) -> BoundReport:
+    """W_a that covers |P - test| at every line, and on a grid between lines as far as the tests' fits say something.
+
+    At the lines this is Thesis Eq. (2.21).
+
+    Parameters
+    ----------
+    plant
+        The nominal plant P.
+    tests
+        The tests to cover.
+    models
+        Each test's own fit, in the same order; None leaves what is between the lines open.
+    order
+        Number n of W_a's poles, 1 to HIGHEST_ORDER; there are n - 1 zeros. 2 is the form of (2.22).
+
+    Raises
+    ------
+    InputError
+        An order that is no such number or takes more lines than there are, a number of models that is not the
+        tests', a residual that is not finite, or a plant that meets every test exactly.
+    RuntimeError
+        The bound found does not cover a residual.
+
+    Notes
+    -----
+    n - 1 zeros for n poles is what (2.22) has for n = 2: W_a falls off like 1/s as the residuals of strictly proper
+    plants do, and an order contains the one below (a zero on a pole), so that more poles are never looser.
+
+    Between the lines the data speak through each test's fit: two resonances that differ by less than the lines'
+    distance part on a peak of |P - P_test| that no line sees. The grid there is made of equal angles on the circles
+    of the modes of P and P_test, within the test's own band. What remains between a test and its own fit is not
+    added between the lines: it counts in full at every line, where it was seen, and is the instrument's rather than
+    the plant's as far as it changes from line to line.
+
+    The excess counts over :func:`identification.bound.envelope.envelope_of`, since single residuals come near zero by
+    chance; :func:`identification.bound.tightest_bound.fit_bound` says what is least. It sees one point a bin, and then,
+    round by round, the worst points of the bound found, the peaks and notches of the bound itself among them.
+    """
+    _refuse(tests, models, order)
+    lines = _sample([(test.omega, np.abs(plant(1j * test.omega) - test.response)) for test in tests])
+    if not lines.residual.any():
+        raise InputError("the model meets every test exactly; expected residuals to bound")
+    low, high = lines.omega.min(), lines.omega.max()
+    grid = np.geomspace(low, high, GRID)[1:-1]
+    pairs = () if models is None else tuple(zip(tests, models, strict=True))
+
+    def around(test: FrequencyResponse, *models: PlantModel | AdditiveBound) -> Real:
+        return np.concatenate([grid, test.omega[[0, -1]], resonances(plant, *models)])
+
+    gaps = _sample([_apart(plant, *pair, around(*pair)) for pair in pairs])
+    envelopes = [envelope_of(sample.omega, sample.residual) for sample in (lines, gaps) if sample.residual.any()]
+
+    def points(*parts: tuple[Real, Real]) -> Points:
+        """Residuals at single frequencies, with the envelope of everything."""
+        omega, where = np.unique(np.concatenate([part[0] for part in parts]), return_inverse=True)
+        largest = np.zeros(omega.size)
+        np.maximum.at(largest, where, np.concatenate([part[1] for part in parts]))
+        level = np.max([envelope(omega) for envelope in envelopes], axis=0)
+        return Points(omega[level > 0], largest[level > 0], level[level > 0])
+
+    def probe(bound: AdditiveBound) -> Points:
+        omega = resonances(bound)
+        omega = omega[(omega > low) & (omega < high)]
+        found = _sample([_apart(plant, *pair, omega) for pair in pairs])
+        return points((omega, np.zeros(omega.size)), (found.omega, found.residual))
+
+    seen = points((lines.omega, lines.residual), (gaps.omega, gaps.residual), (grid, np.zeros(grid.size)))
+    bound, least_excess = tightest(seen, probe, order)
+    gaps = _sample([_apart(plant, *pair, _peaks(bound, plant, *pair, around(*pair, bound))) for pair in pairs])
+    bound, touches = _touching(bound, lines, gaps, [test.name for test in tests])
+    every = seen.joined(probe(bound))
+    over = _excess(bound, every.omega, every.envelope)
+    apart = [_excess(bound, envelope.omega, envelope.level) for envelope in envelopes]
+    return BoundReport(
+        bound=bound,
+        largest_excess=over.largest,
+        mean_excess=over.mean,
+        least_excess=min(least_excess, over.largest),
+        at_lines=apart[0],
+        between_lines=apart[1] if len(apart) > 1 else None,
+        touches=touches,
+    )
+
+
+def _refuse(tests: Sequence[FrequencyResponse], models: Sequence[PlantModel] | None, order: int) -> None:
+    if order not in range(1, HIGHEST_ORDER + 1):
+        raise InputError(f"the order of the bound is {order}; expected an integer from 1 to {HIGHEST_ORDER}")
+    lines = np.unique(np.concatenate([test.omega for test in tests])).size
+    if lines < 4 * order:
+        raise InputError(f"the tests have {lines} lines; expected {4 * order} or more for a bound of order {order}")
+    if models is not None and len(models) != len(tests):
+        raise InputError(f"there are {len(models)} fits; expected one for each of the {len(tests)} tests")
+
+
+def _apart(plant: PlantModel, test: FrequencyResponse, model: PlantModel, omega: Real) -> tuple[Real, Real]:
+    """The frequencies within the test's band, and |P - P_test| there."""
+    omega = omega[(omega >= test.omega[0]) & (omega <= test.omega[-1])]
+    nominal = plant(1j * omega)
+    distance = np.abs(nominal - model(1j * omega))
+    return omega, np.where(distance > ROUNDING * np.abs(nominal), distance, 0.0)
+
+
+def _peaks(bound: AdditiveBound, plant: PlantModel, test: FrequencyResponse, model: PlantModel, omega: Real) -> Real:
+    """``omega`` and what is between where |P - P_test|/|W_a| is largest there: the peaks that ``omega`` shows."""
+    zoomed = np.unique(omega)
+    for _ in range(ZOOMS):
+        zoomed, distance = _apart(plant, test, model, zoomed)
+        ratio = distance / np.abs(bound(1j * zoomed))
+        inner = ratio[1:-1]
+        top = (inner >= ratio[:-2]) & (inner >= ratio[2:]) & (inner > (1 - PEAK) * ratio.max())
+        finer = np.linspace(zoomed[:-2][top], zoomed[2:][top], ZOOM)
+        zoomed = np.unique(np.append(finer, zoomed[np.argmax(ratio)]))
+    return np.append(omega, zoomed)
+
+
+def _sample(residuals: Sequence[tuple[Real, Real]]) -> _Sample:
+    """Put together frequencies and residuals of the tests."""
+    omega = np.concatenate([np.empty(0), *(pair[0] for pair in residuals)])
+    residual = np.concatenate([np.empty(0), *(pair[1] for pair in residuals)])
+    if not np.all(np.isfinite(residual)):
+        raise InputError(
+            f"a test's distance from the model is not finite at {omega[~np.isfinite(residual)][0]:.6g} rad/s"
+        )
+    return _Sample(omega, residual, np.repeat(np.arange(len(residuals)), [pair[0].size for pair in residuals]))
+
+
+def _touching(
+    bound: AdditiveBound, lines: _Sample, gaps: _Sample, names: Sequence[str]
+) -> tuple[AdditiveBound, tuple[Touch, ...]]:
+    """The bound with the least gain that covers, and where it touches; raises RuntimeError if it does not cover."""
+    omega = np.concatenate([lines.omega, gaps.omega])
+    residual = np.concatenate([lines.residual, gaps.residual])
+    test = np.concatenate([lines.test, gaps.test])
+    bound = replace(bound, gain=bound.gain * float(np.max(residual / np.abs(bound(1j * omega)))) * (1 + MARGIN))
+    ratio, some = np.full(omega.size, np.inf), residual > 0
+    ratio[some] = np.abs(bound(1j * omega[some])) / residual[some]
+    if not np.all(ratio >= 1):
+        raise RuntimeError(f"the additive bound misses a residual by a factor {1 / ratio.min():.3g}")
+    touches: list[Touch] = []
+    for i in np.argsort(ratio, kind="stable")[: np.count_nonzero(ratio <= 1 + NEAR)]:
+        if all(abs(np.log(omega[i] / touch.omega)) > WIDTH for touch in touches):
+            touches.append(Touch(float(omega[i]), names[test[i]], bool(i >= lines.omega.size), float(ratio[i])))
+    return bound, tuple(touches)
+
+
+def _excess(bound: AdditiveBound, omega: Real, level: Real) -> Excess:
+    ratio = np.abs(bound(1j * omega)) / level
+    at = int(np.argmax(ratio))
+    mean = np.exp(shares(np.log(omega)) @ np.log(ratio))
+    return Excess(float(ratio[at]), float(omega[at]), float(mean))

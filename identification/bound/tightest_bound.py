@@ -1,0 +1,215 @@
+"""An envelope -> a W_a of order n that covers residuals with nearly the least largest excess and then little mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, minimize
+
+from identification.base.arrays import Real
+from identification.bound.least_excess import least_largest_excess
+from identification.bound.shape import OUTSIDE, Shape
+from identification.model.plant import AdditiveBound, PlantModel
+
+ALLOWANCE = 0.05  # share of the least largest excess that is given away for a smaller mean
+BEYOND = np.geomspace(1.0, OUTSIDE, 21)[1:]  # times the band's edges
+BINS = 200  # equal in log frequency, each with one point to begin with and one more a round where it is needed
+ROUNDS = 12
+TIGHT = 1e-3  # share by which W_a may miss a residual or exceed the largest excess in between
+ANGLES = 128  # equal ones on the circle that a mode draws in the complex plane, whose own peak they miss by 0.01 %
+ITERATIONS = 100
+PRECISION = 1e-7  # in the logarithm of the excess
+
+
+@dataclass(frozen=True)
+class Points:
+    """Where W_a is fitted.
+
+    Parameters
+    ----------
+    omega
+        (K,) rad/s, increasing; the first and the last are the band's edges.
+    residual
+        (K,) that |W_a| has to cover, output unit per input unit; 0 asks for nothing.
+    envelope
+        (K,) over which the excess counts, positive and at least the residual.
+    """
+
+    omega: Real
+    residual: Real
+    envelope: Real
+
+    def of(self, index: NDArray[np.intp]) -> Points:
+        """Some of the points."""
+        return Points(self.omega[index], self.residual[index], self.envelope[index])
+
+    def joined(self, other: Points) -> Points:
+        """Both, in increasing frequency."""
+        omega, first = np.unique(np.concatenate([self.omega, other.omega]), return_index=True)
+        residual = np.concatenate([self.residual, other.residual])[first]
+        return Points(omega, residual, np.concatenate([self.envelope, other.envelope])[first])
+
+
+def tightest(seen: Points, probe: Callable[[AdditiveBound], Points], order: int) -> tuple[AdditiveBound, float]:
+    """The W_a of :func:`fit_bound` for more points than that could take at once, and a proved limit to tightness.
+
+    Parameters
+    ----------
+    seen
+        All that has to be covered.
+    probe
+        What else has to be covered where a bound has its own peaks and notches.
+    order
+        n, the number of poles.
+
+    Returns
+    -------
+    AdditiveBound, float
+        The bound, which may miss residuals by TIGHT (or more after ROUNDS), and the ratio to the envelope below which
+        the largest of no W_a of this order is.
+
+    Notes
+    -----
+    Exchange as in Remez's algorithm: fit the largest residual of each bin, add the worst point of each bin where the
+    bound misses a residual or exceeds the largest excess of the points fitted, and fit again. What is proved for
+    fewer points holds for all.
+    """
+    edges = np.log(seen.omega[[0, -1]])
+    chosen = seen.of(np.union1d(_largest(seen.omega, seen.residual, edges), [0, seen.omega.size - 1]))
+    for _ in range(ROUNDS):
+        bound = fit_bound(chosen, order)
+        every = seen.joined(probe(bound))
+        magnitude, fitted = np.abs(bound(1j * every.omega)), np.abs(bound(1j * chosen.omega))
+        worst = np.maximum(every.residual / magnitude, magnitude / every.envelope / np.max(fitted / chosen.envelope))
+        missing = _largest(every.omega, worst, edges)
+        missing = missing[worst[missing] > 1 + TIGHT]
+        if not missing.size:
+            break
+        chosen = chosen.joined(every.of(missing))
+    return bound, least_largest_excess(chosen.omega, chosen.residual, chosen.envelope, order).proved
+
+
+def fit_bound(points: Points, order: int) -> AdditiveBound:
+    """A W_a of an order that covers the points tightly, with the least gain that does.
+
+    Parameters
+    ----------
+    points
+        The residuals and their envelope.
+    order
+        n, the number of poles; there are n - 1 zeros.
+
+    Notes
+    -----
+    :func:`identification.bound.least_excess.least_largest_excess` comes near the least largest excess there is and
+    gives its roots. From these, moved to where poles and zeros may be, two searches in the logarithms of gain,
+    frequencies and dampings (sequential quadratic programming, which finds local minima): for the least largest excess
+    again, now of an admissible W_a, then for the least mean over log frequency of the log excess within ALLOWANCE of
+    it. One frequency may decide the largest excess, such as a deep notch of the envelope, and leave the rest of W_a
+    free: on six tests of one plant and for order 2, the bound of least largest excess has a needle of zeta = 0.007
+    beside the residuals' peak, and 5 % above that the mean no longer gains (zeta = 0.028).
+
+    Beyond the band, where nothing was measured, |W_a| may exceed the envelope's continuation, in proportion to
+    omega above and to 1/omega below, by no more than it exceeds the envelope: no resonance goes where no data are.
+    """
+    low, high, nothing = points.omega[0], points.omega[-1], np.zeros(BEYOND.size)
+    omega = np.concatenate([low / BEYOND[::-1], points.omega, high * BEYOND])
+    envelope = np.concatenate([points.envelope[0] * BEYOND[::-1], points.envelope, points.envelope[-1] * BEYOND])
+    residual = np.concatenate([nothing, points.residual, nothing])
+    weight = np.concatenate([nothing, shares(np.log(points.omega)), nothing])
+    ideal = least_largest_excess(omega, residual, envelope, order)
+    shape = Shape(order, float(low), float(high))
+    log_envelope, seen = np.log(envelope), residual > 0
+    log_residual = np.log(residual[seen])
+
+    def covering(theta: Real) -> tuple[Real, float]:
+        """Parameters within their bounds whose gain just covers, and their largest log excess."""
+        theta = np.clip(theta, *shape.bounds.T)
+        theta[0] += np.max(log_residual - shape.log(theta, omega)[seen])
+        return theta, float(np.max(shape.log(theta, omega) - log_envelope))
+
+    def mean(theta: Real) -> float:
+        return float(weight @ (shape.log(theta, omega) - log_envelope))
+
+    def slack(theta: Real, largest: float) -> Real:
+        log = shape.log(theta, omega)
+        return np.concatenate([log[seen] - log_residual, largest + log_envelope - log])
+
+    def slack_slope(theta: Real) -> Real:
+        slope = shape.slope(theta, omega)
+        return np.vstack([slope[seen], -slope])
+
+    theta, largest = covering(shape.parameters(ideal.zeros, ideal.poles))
+    relaxes = np.concatenate([np.zeros(seen.sum()), np.ones(omega.size)])
+    least = _search(
+        lambda p: float(p[-1]),
+        lambda p: np.eye(p.size)[-1],
+        np.append(theta, largest),
+        np.vstack([shape.bounds, [-np.inf, np.inf]]),
+        lambda p: slack(p[:-1], p[-1]),
+        lambda p: np.column_stack([slack_slope(p[:-1]), relaxes]),
+    )
+    theta, largest = min((theta, largest), covering(least[:-1]), key=lambda pair: pair[1])
+    limit = largest + np.log1p(ALLOWANCE)
+    flatter, its_largest = covering(
+        _search(
+            mean,
+            lambda p: weight @ shape.slope(p, omega),
+            theta,
+            shape.bounds,
+            lambda p: slack(p, limit),
+            slack_slope,
+        )
+    )
+    if its_largest <= limit + TIGHT and mean(flatter) < mean(theta):
+        theta = flatter
+    return shape.bound(theta)
+
+
+def shares(x: Real) -> Real:
+    """(K,) weights of the mean over increasing ``x`` (K,) of what is linear between its values."""
+    half = np.diff(x) / 2 / (x[-1] - x[0])
+    return np.append(half, 0.0) + np.append(0.0, half)
+
+
+def resonances(*models: PlantModel | AdditiveBound) -> Real:
+    """Frequencies (M,) in rad/s about each mode, at equal angles of 1 + j (omega/omega_0 - omega_0/omega)/(2 zeta)."""
+    angles = (np.arange(ANGLES) + 0.5) / ANGLES * np.pi - np.pi / 2
+    modes = [mode for model in models for mode in (*model.zero_modes, *model.pole_modes)]
+    return np.concatenate(
+        [np.empty(0), *(mode.omega * np.exp(np.arcsinh(mode.zeta * np.tan(angles))) for mode in modes)]
+    )
+
+
+def _largest(omega: Real, values: Real, edges: Real) -> NDArray[np.intp]:
+    """Where the largest value of each bin is; the bins that hold nothing are left out."""
+    bins = np.linspace(edges[0], edges[1], BINS + 1)[1:-1]
+    where = np.searchsorted(bins, np.log(omega), side="right")
+    order = np.lexsort((values, where))
+    return order[np.append(np.diff(where[order]) > 0, True)]
+
+
+def _search(
+    cost: Callable[[Real], float],
+    cost_slope: Callable[[Real], Real],
+    start: Real,
+    bounds: Real,
+    slack: Callable[[Real], Real],
+    slack_slope: Callable[[Real], Real],
+) -> Real:
+    """A local minimum of the cost where no slack is negative, both nearly."""
+    constraint: Any = {"type": "ineq", "fun": slack, "jac": slack_slope}
+    found = minimize(
+        cost,
+        start,
+        jac=cost_slope,
+        bounds=Bounds(*bounds.T),
+        constraints=constraint,
+        method="SLSQP",
+        options={"maxiter": ITERATIONS, "ftol": PRECISION},
+    )
+    return np.asarray(found.x)

@@ -1,0 +1,1 @@
+"""Tool: frequency responses -> the nominal plant."""

@@ -1,0 +1,177 @@
+"""Several tests' fits -> one nominal plant with confidence intervals, and whether the tests agree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import chdtrc, ndtri, stdtrit
+
+from identification.base.arrays import Real
+from identification.base.errors import InputError
+from identification.fitting.likelihood import maximise_together
+from identification.fitting.single_test_fit import FINE, OneFit, ScaledTest
+from identification.model.plant import PlantModel
+from identification.model.structure import Structure
+
+INSIGNIFICANT = 2.0  # a delay below this many standard errors of the noise is taken as none: it is bounded by 0
+CONFIDENCE = 0.95
+ONE_PLANT = 0.01  # probability below which tests of one plant do not differ as much as these do
+WIDEST = 20.0  # half width, a logarithm, beyond which an interval says nothing
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """The nominal plant and how sure it is.
+
+    Parameters
+    ----------
+    structure
+        Of every test's plant and of the nominal one.
+    theta
+        (p,) nominal parameters of the structure: the likeliest for all tests at once where they agree, else the mean
+        of each test's own.
+    sign
+        Of the gain.
+    noise, misfit, scatter
+        (p,) standard errors of theta: from residuals that are noise, from residuals that are not but what the model
+        leaves, and from how the tests differ (None for one test). The scatter contains the noise.
+    agreement
+        Probability that tests of one plant differ as much as these do (None for one test).
+    count
+        Number of tests.
+    """
+
+    structure: Structure
+    theta: Real
+    sign: float
+    noise: Real
+    misfit: Real
+    scatter: Real | None
+    agreement: float | None
+    count: int
+
+    @property
+    def plant(self) -> PlantModel:
+        """The nominal plant; a delay that cannot be told from none is none."""
+        theta = self.theta.copy()
+        if theta[-1] < INSIGNIFICANT * self.noise[-1]:
+            theta[-1] = 0.0
+        return self.structure.plant(theta, self.sign)
+
+    @property
+    def scattered(self) -> bool:
+        """Whether the tests differ by more than their noise."""
+        return self.agreement is not None and self.agreement < ONE_PLANT
+
+    @property
+    def errors(self) -> Real:
+        """(p,) standard errors of theta: noise, or scatter where that is larger and the tests differ, and misfit."""
+        random = self.noise if self.scatter is None or not self.scattered else np.maximum(self.noise, self.scatter)
+        return np.hypot(random, self.misfit)
+
+    @property
+    def half_widths(self) -> Real:
+        """(p,) of the 95 % intervals of theta; of the scatter by Student's distribution."""
+        normal = ndtri((1 + CONFIDENCE) / 2)
+        random = normal * self.noise
+        if self.scatter is not None and self.scattered:
+            student = stdtrit(self.count - 1, (1 + CONFIDENCE) / 2)
+            random = np.maximum(random, student * self.scatter)
+        return np.minimum(np.hypot(random, normal * self.misfit), WIDEST)
+
+    @property
+    def intervals(self) -> tuple[Real, Real]:
+        """Lower and upper ends (p,) of the 95 % intervals in physical units; positive but for the gain's sign."""
+        ends = [self._physical(self.theta + side * self.half_widths) for side in (-1, 1)]
+        return (ends[0], ends[1]) if self.sign > 0 else (self._swapped(ends[0], ends[1]))
+
+    def _physical(self, theta: Real) -> Real:
+        values = np.append(np.exp(theta[:-1]), max(0.0, theta[-1]))
+        values[0] *= self.sign
+        return values
+
+    @staticmethod
+    def _swapped(lower: Real, upper: Real) -> tuple[Real, Real]:
+        lower[0], upper[0] = upper[0], lower[0]
+        return lower, upper
+
+
+def nominal_of(tests: Sequence[ScaledTest], fits: Sequence[OneFit]) -> Nominal:
+    """The plant that stands for all tests.
+
+    Parameters
+    ----------
+    tests, fits
+        The tests and each one's own fit, all of one structure.
+
+    Raises
+    ------
+    InputError
+        The tests disagree about the gain's sign.
+
+    Notes
+    -----
+    Whether the tests differ by more than noise is judged by how much less likely one plant for all makes them (twice
+    the logarithm of the ratio is chi-square) and by Cochran's Q for each parameter, with Bonferroni's factors. If they
+    do not, that one plant is the nominal one, as sure as the noise allows. If they do, the mean of the tests'
+    parameters is, geometric for all but the delay, as sure as the scatter says by Student's distribution.
+
+    What the model leaves in residuals that are no noise is the same in every test: its share of the standard errors
+    does not become smaller by averaging. For residuals whose neighbours correlate by rho, more than by chance, the
+    variance is taken as (1 + rho)/(1 - rho) of the noise's.
+    """
+    signs = {fit.sign for fit in fits}
+    if len(signs) > 1:
+        raise InputError(
+            "the gain is positive in "
+            f"{', '.join(fit.name for fit in fits if fit.sign > 0)} and negative in "
+            f"{', '.join(fit.name for fit in fits if fit.sign < 0)}; expected tests of one plant"
+        )
+    thetas, count = np.array([fit.theta for fit in fits]), len(fits)
+    theta, agreement, scatter = thetas.mean(axis=0), None, None
+    covariances = np.array([fit.covariance for fit in fits])
+    variances = np.einsum("tii->ti", covariances)
+    noise = variances.mean(axis=0) / count
+    if count > 1:
+        scatter = thetas.std(axis=0, ddof=1) / np.sqrt(count)
+        one, increase = _together(tests, fits)
+        together = chdtrc(theta.size * (count - 1), increase)
+        mean = np.average(thetas, axis=0, weights=1 / variances)
+        alone = chdtrc(count - 1, np.sum((thetas - mean) ** 2 / variances, axis=0))
+        agreement = float(min(1.0, 2 * together, 2 * theta.size * alone.min()))
+        if agreement >= ONE_PLANT:
+            theta = one
+            pairs = zip(tests, fits, strict=True)
+            covariances = np.array([test.covariance_at(fit, theta) for test, fit in pairs])
+            variances = np.einsum("tii->ti", covariances)
+            # in units of typical standard errors, where the matrices are well conditioned
+            units = np.sqrt(variances.mean(axis=0))
+            information = np.linalg.inv(covariances / np.outer(units, units)).sum(axis=0)
+            noise = np.diag(np.linalg.inv(information)) * units**2
+    misfit = np.mean([fit.misfit * variance for fit, variance in zip(fits, variances, strict=True)], axis=0)
+    return Nominal(fits[0].structure, theta, signs.pop(), np.sqrt(noise), np.sqrt(misfit), scatter, agreement, count)
+
+
+def _together(tests: Sequence[ScaledTest], fits: Sequence[OneFit]) -> tuple[Real, float]:
+    """The one theta in physical units that is likeliest for all tests, and by how much the deviance is larger."""
+    first, structure = tests[0], fits[0].structure
+    parts = [
+        replace(
+            test.lines,
+            omega=test.omega * (test.centre / first.centre),
+            response=test.lines.response * (test.level / first.level),
+            held_s=test.lines.held_s and test.lines.held_s * (first.centre / test.centre),
+        )
+        for test in tests
+    ]
+    weights = [1 / fit.errors**2 for fit in fits]
+    start = first.to_scaled(structure, np.average([fit.theta for fit in fits], axis=0, weights=weights))
+    theta, deviance = maximise_together(parts, structure, start, fits[0].sign, soft=first.soft, tolerance=FINE)
+    # each test's own deviance is that of its response in units of its own level
+    alone = sum(
+        fit.deviance + 4 * test.omega.size * float(np.log(test.level / first.level))
+        for test, fit in zip(tests, fits, strict=True)
+    )
+    return first.to_physical(structure, theta), deviance - alone

@@ -1,0 +1,292 @@
+"""The fit of one test: competing first guesses, random restarts, and the standard errors of the winner."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.base.arrays import Complex, Real
+from identification.base.errors import InputError
+from identification.fitting.first_guess import guesses
+from identification.fitting.least_squares import log_jacobian, response_of, stacked
+from identification.fitting.likelihood import Likely, Lines, maximise
+from identification.fitting.neighbouring_structures import grown
+from identification.model.plant import PlantModel
+from identification.model.structure import Structure
+from identification.sweeps.response import FrequencyResponse
+
+GUESSES = 4
+RESTARTS = 8
+GROWN = 2  # places tried for one more mode pair, of a grid of places and damping ratios
+PURSUED = 2  # first guesses that are pursued of those ranked
+COARSE, FINE = 1e-4, 1e-14  # least squares tolerance while guesses compete, and of the winner
+ALIKE = 0.5  # deviance a line: two tests with residuals within 30 % are explained alike
+SAME = 1.0  # deviances closer than this are the same optimum
+FIRST_FLOORS = (0.05, 0.002)  # of the median response, in the errors assumed before any are known
+WORST = 0.5  # median distance over the response above which nothing was fitted
+ROUNDING = 1e-7  # errors below are the file's digits
+SINGULAR = 1e-13  # smallest eigenvalue of the scaled information matrix that can be inverted
+
+
+class Undetermined(InputError):
+    """The data do not determine the parameters of a model."""
+
+
+@dataclass(frozen=True)
+class OneFit:
+    """The plant of one test.
+
+    Parameters
+    ----------
+    name
+        The test's.
+    structure
+        Of the plant.
+    theta
+        (p,) parameters of the structure in physical units, modes sorted by omega.
+    sign
+        Of the gain.
+    covariance
+        (p, p) of theta, from residuals that are noise.
+    deviance
+        -2 log likelihood, of the response in units of its own.
+    spread
+        Factor between the covariance and the inverse curvature of the squared residuals, see :meth:`ScaledTest.finish`.
+    misfit
+        What the covariance of theta is to be multiplied by and added on account of residuals that are no noise but what
+        the model leaves; 0 when neighbouring residuals correlate no more than by chance.
+    floor, relative
+        a and b of the noise E|error|^2 = a^2 + b^2 |P|^2, estimated; a in the response's unit. For soft-L1 errors
+        the same of their scale.
+    chi_square
+        Squared residuals over their variance, per degree of freedom; near 1 because a and b are estimated.
+    correlation
+        Of neighbouring normalised residuals; 0 within 1/sqrt(lines) when they are noise.
+    distance
+        Median of |test - plant|/|test|.
+    lines
+        M, the number of frequencies.
+    """
+
+    name: str
+    structure: Structure
+    theta: Real
+    sign: float
+    covariance: Real
+    deviance: float
+    spread: float
+    misfit: float
+    floor: float
+    relative: float
+    chi_square: float
+    correlation: float
+    distance: float
+    lines: int
+
+    @property
+    def errors(self) -> Real:
+        """(p,) standard errors of theta from the residuals of this test, noise and misfit."""
+        return np.sqrt(np.diag(self.covariance) * (1 + self.misfit))
+
+    @property
+    def plant(self) -> PlantModel:
+        """The test's own model."""
+        return self.structure.plant(self.theta, self.sign)
+
+
+class ScaledTest:
+    """One test in units where its frequencies and its response are of order 1, so that units cannot matter."""
+
+    def __init__(self, test: FrequencyResponse, soft: bool) -> None:
+        self.name = test.name
+        self.soft = soft
+        self.centre = float(np.sqrt(test.omega[0] * test.omega[-1]))
+        self.level = float(np.median(np.abs(test.response))) or float(np.max(np.abs(test.response)))
+        self.omega = test.omega / self.centre
+        excitation = np.ones_like(self.omega) if test.excitation is None else test.excitation
+        held_s = test.record.sampling_s * self.centre if test.record is not None and test.record.held else None
+        self.lines = Lines(self.omega, test.response / self.level, excitation, held_s)
+
+    def fit(self, structure: Structure, simpler: Likely | None, enough: float) -> Likely:
+        """The likeliest of several guesses, which may build on a fit with one zero mode and pole mode less.
+
+        Stops early when two guesses lead to the same optimum, or a few stay far above the deviance ``enough``.
+        """
+        best: Likely | None = None
+        for tried, (theta, sigma) in enumerate(self._starts(structure, simpler), 1):
+            found = self._maximise(structure, theta, sigma, enough=enough)
+            agree = best is not None and abs(found.deviance - best.deviance) < SAME
+            if best is None or found.deviance < best.deviance:
+                best = found
+            if agree or (tried >= GUESSES and best.deviance > enough + ALIKE * self.omega.size):
+                break
+        assert best is not None
+        return best
+
+    def _starts(self, structure: Structure, simpler: Likely | None) -> Iterator[tuple[Real, Real]]:
+        """First parameters and the errors' sigma to begin with, the most promising first; costly ones come late."""
+        more: list[tuple[Real, Real]] = []
+        if simpler is not None:
+            sigma = self._sigma(simpler)
+            more = [(theta, sigma) for theta in grown(simpler, self.omega, self._response(simpler), sigma, GROWN)]
+        response = self.lines.response if simpler is None else self._response(simpler)
+        for floor in FIRST_FLOORS:
+            sigma = np.asarray(np.sqrt((np.abs(response) ** 2 + floor**2) * self.lines.excitation))
+            for guess in guesses(self.omega, response, sigma, structure, GUESSES):
+                yield guess, sigma
+                if more:
+                    yield more.pop(0)
+
+    def pursue(self, structure: Structure, starts: Iterable[Real], known: Likely, enough: float) -> Likely:
+        """The likeliest fit from the most promising of ``starts``, with the errors of a fit that is known already."""
+        sigma = self._sigma(known)
+        promising = self._ranked(structure, starts, self._response(known), sigma)[:PURSUED]
+        fits = [self._maximise(structure, theta, sigma, enough=enough) for theta in promising]
+        return min(fits, key=lambda likely: likely.deviance)
+
+    def _ranked(self, structure: Structure, starts: Iterable[Real], response: Complex, sigma: Real) -> list[Real]:
+        """``starts``, each with its best gain, by a cost that a few lines far off cannot decide."""
+
+        def cost(theta: Real) -> float:
+            shape = response_of(structure, theta, self.omega) / sigma
+            gain = np.vdot(shape, response / sigma).real / np.vdot(shape, shape).real
+            return float(np.sum(np.log1p(np.abs(gain * shape - response / sigma) ** 2)))
+
+        return sorted(starts, key=cost)
+
+    def follow(self, other: ScaledTest, theirs: Likely) -> Likely:
+        """What the parameters that fit another test lead to."""
+        theta = self.to_scaled(theirs.structure, other.to_physical(theirs.structure, theirs.theta))
+        return self._maximise(theirs.structure, theta, self._sigma(theirs))
+
+    def as_well(self, mine: Likely, other: ScaledTest, theirs: Likely) -> bool:
+        """Whether this test is explained as well as another one."""
+        return mine.deviance / self.omega.size < theirs.deviance / other.omega.size + ALIKE
+
+    def restart(self, so_far: Likely, rng: np.random.Generator) -> Likely:
+        """The likeliest of ``so_far`` and of random modes within the band."""
+        structure, sigma = so_far.structure, self._sigma(so_far)
+        best = so_far
+        frequency, (low, high) = structure.frequencies(), np.log(self.omega[[0, -1]])
+        for _ in range(RESTARTS):
+            theta = rng.uniform(np.log(0.003), np.log(0.7), structure.size)
+            theta[frequency] = rng.uniform(low, high, int(frequency.sum()))
+            theta[-1] = so_far.theta[-1] * rng.uniform(0.5, 1.5)
+            best = min(best, self._maximise(structure, theta, sigma), key=lambda likely: likely.deviance)
+        return best
+
+    @property
+    def chance(self) -> float:
+        """Correlation of neighbouring residuals that noise alone hardly reaches."""
+        return 3 / float(np.sqrt(self.omega.size))
+
+    def correlation(self, likely: Likely) -> float:
+        """Of neighbouring residuals, each over its standard deviation; real part."""
+        r = self._residual(likely) / self._sigma(likely)
+        power = float(np.sum(np.abs(r) ** 2))
+        return float(np.vdot(r[1:], r[:-1]).real / power) if power > 0 else 0.0
+
+    def exact(self, likely: Likely) -> bool:
+        """Whether nothing but rounding is left."""
+        return max(likely.floor, likely.relative) < ROUNDING
+
+    def finish(self, likely: Likely) -> OneFit:
+        """Polish the fit and give its parameters and their covariance in physical units.
+
+        Raises
+        ------
+        InputError
+            The model is nowhere near the data.
+        Undetermined
+            The data leave a parameter undetermined.
+
+        Notes
+        -----
+        With rows r of the residuals' derivatives over sigma, psi the loss's derivative and errors alike at all lines
+        the covariance is E|psi|^2/E(psi')^2 (sum r r')^-1 (Huber, "Robust Statistics", section 7.6).
+        """
+        likely = self._maximise(likely.structure, likely.theta, self._sigma(likely), FINE)
+        structure = likely.structure
+        likely = replace(likely, theta=likely.theta[structure.in_order(likely.theta)])
+        distance = float(np.median(np.abs(self._residual(likely)) / np.maximum(np.abs(self._response(likely)), 1e-300)))
+        if distance > WORST:
+            raise InputError(
+                f"{self.name}: no stable minimum phase plant with {structure} fits (median distance "
+                f"{100 * distance:.0f} % of the response); expected at most {100 * WORST:.0f} %"
+            )
+        correlation = self.correlation(likely)
+        z = np.abs(self._residual(likely) / self._sigma(likely)) ** 2
+        freedom = 1 - structure.size / (2 * self.omega.size)
+        spread = float(np.mean(z)) / 2 / freedom
+        if self.soft:
+            spread = float(np.mean(z / (1 + z)) / 2 / np.mean((1 + z / 2) / (1 + z) ** 1.5) ** 2) / freedom
+        return OneFit(
+            name=self.name,
+            structure=structure,
+            theta=self.to_physical(structure, likely.theta),
+            sign=likely.sign,
+            covariance=self._covariance(likely, spread),
+            deviance=likely.deviance,
+            spread=spread,
+            misfit=2 * correlation / (1 - correlation) if correlation > self.chance else 0.0,
+            floor=likely.floor * self.level,
+            relative=likely.relative,
+            chi_square=float(np.mean(z)) / freedom,
+            correlation=correlation,
+            distance=distance,
+            lines=self.omega.size,
+        )
+
+    def covariance_at(self, fit: OneFit, theta: Real) -> Real:
+        """The covariance of this test's ``fit`` if ``theta`` (p,) in physical units were the truth."""
+        scaled = self.to_scaled(fit.structure, theta)
+        likely = Likely(fit.structure, scaled, fit.sign, fit.floor / self.level, fit.relative, np.nan)
+        return self._covariance(likely, fit.spread)
+
+    def _covariance(self, likely: Likely, spread: float) -> Real:
+        """Covariance (p, p) of theta in physical units."""
+        structure, sigma = likely.structure, self._sigma(likely)
+        model = response_of(structure, likely.theta, self.omega) / sigma
+        rows = stacked(model[:, None] * log_jacobian(structure, likely.theta, self.omega))
+        curvature = rows @ rows.T
+        scale = 1 / np.sqrt(np.diag(curvature))
+        values, vectors = np.linalg.eigh(curvature * scale[:, None] * scale)
+        if not values[0] > SINGULAR:
+            raise Undetermined(f"{self.name}: the data do not determine {structure}; expected fewer or more lines")
+        units = np.append(np.ones(structure.size - 1), 1 / self.centre)
+        weighted = vectors * (scale * units)[:, None]
+        return np.asarray(spread * (weighted / values) @ weighted.T)
+
+    def to_physical(self, structure: Structure, theta: Real) -> Real:
+        """Parameters in physical units from scaled ones."""
+        return _shift(structure, theta, np.log(self.centre), np.log(self.level), 1 / self.centre)
+
+    def to_scaled(self, structure: Structure, theta: Real) -> Real:
+        """Scaled parameters from those in physical units."""
+        return _shift(structure, theta, -np.log(self.centre), -np.log(self.level), self.centre)
+
+    def _maximise(
+        self, structure: Structure, theta: Real, sigma: Real, tolerance: float = COARSE, enough: float = np.inf
+    ) -> Likely:
+        return maximise(self.lines, structure, theta, sigma, soft=self.soft, tolerance=tolerance, enough=enough)
+
+    def _response(self, likely: Likely) -> Complex:
+        """What was measured, without the aliases of a fit."""
+        return self.lines.response - self.lines.aliases(likely.structure, likely.theta, likely.sign)
+
+    def _residual(self, likely: Likely) -> Complex:
+        return self._response(likely) - likely.sign * response_of(likely.structure, likely.theta, self.omega)
+
+    def _sigma(self, likely: Likely) -> Real:
+        power = np.abs(response_of(likely.structure, likely.theta, self.omega)) ** 2
+        return np.sqrt((likely.floor**2 + likely.relative**2 * power) * self.lines.excitation)
+
+
+def _shift(structure: Structure, theta: Real, log_centre: float, log_level: float, delay_unit: float) -> Real:
+    moved = theta.copy()
+    moved[structure.frequencies()] += log_centre
+    moved[0] += log_level + structure.integrators * log_centre
+    moved[-1] *= delay_unit
+    return moved

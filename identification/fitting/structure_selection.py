@@ -1,0 +1,219 @@
+"""Which structure the data ask for: of those tried from simple to rich and back that of least Bayesian criterion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from identification.base.errors import InputError
+from identification.fitting.likelihood import Likely
+from identification.fitting.neighbouring_structures import has_needle, neighbours, reached_from, within_band
+from identification.fitting.single_test_fit import ScaledTest
+from identification.model.structure import Structure, Wanted
+
+MOST_MODES = 8
+BEHIND = 1.0  # deviance a line, behind the best number of integrators, at which another one is given up
+WHITE = 0.1  # correlation of neighbouring residuals below which nothing is left to explain
+FRUITLESS = 2  # rows of the path without a better structure after which it ends
+LEVELLED = 0.2  # of the path's largest gain, below which gains are taken for those of superfluous pairs
+SUPERFLUOUS = 8.0  # deviance that a mode pair too many takes off a test's white residuals; 4 to 10 seen
+HOPELESS = 20.0  # criterion lost on the first tests after which the others are not asked
+
+
+class Selection:
+    """Fits of several tests by several structures.
+
+    Parameters
+    ----------
+    tests
+        Each is fitted on its own.
+    wanted
+        What the user admits.
+    tick
+        Called after each fit of a test.
+
+    Attributes
+    ----------
+    fits
+        For each structure fitted, one fit a test.
+    overdispersion
+        By what the deviance is divided in the criterion: 1 for errors that are noise.
+    """
+
+    def __init__(self, tests: list[ScaledTest], wanted: Wanted, tick: Callable[[], object]) -> None:
+        self.tests = tests
+        self.wanted = wanted
+        self.tick = tick
+        self.fits: dict[Structure, list[Likely]] = {}
+        self.overdispersion = 1.0
+
+    def search(self) -> Structure:
+        """The admitted structure of least criterion that is found.
+
+        Raises
+        ------
+        InputError
+            No structure is admitted, or the tests have too few lines for any.
+
+        Notes
+        -----
+        First as many zeros as poles, pair by pair, for each number of integrators that is not far behind the best;
+        then single steps (:func:`identification.fitting.neighbouring_structures.neighbours`) as long as the criterion
+        falls.
+
+        On a real rig no model leaves white residuals: every further pair of modes takes a little more of a ripple that
+        is no noise, without end. There the criterion is a quasi-likelihood's (Burnham and Anderson, "Model Selection
+        and Multimodel Inference", 2nd ed., section 2.5): the deviance is divided by an overdispersion, which is
+        what the small gains along the path are, in the median, over what superfluous pairs gain on white residuals.
+        """
+        path = self._path()
+        best = min(self.fits, key=self.criterion)
+        if self.wanted.modes is None and not self.white(best):
+            self.overdispersion = self._overdispersion(path)
+            best = min(self.fits, key=self.criterion)
+        best = self._climb(best)
+        if self.overdispersion > 1 and self.white(best):
+            self.overdispersion = 1.0
+            best = self._climb(best)
+        return best
+
+    def _overdispersion(self, path: list[Structure]) -> float:
+        """Median of the path's small gains a test over that of a superfluous pair; 1 without several small gains."""
+        gains = -np.diff([self._deviance(structure) for structure in path]) / len(self.tests)
+        small = gains[gains < LEVELLED * gains.max(initial=0.0)]
+        return max(1.0, float(np.median(small)) / SUPERFLUOUS) if small.size > 1 else 1.0
+
+    def _climb(self, best: Structure) -> Structure:
+        """Single steps from ``best`` as long as the criterion falls."""
+        tried = {best}
+        while True:
+            better = best
+            for step in neighbours(best):
+                if step in tried or not self._affordable(step) or not self.wanted.admits(step):
+                    continue
+                tried.add(step)
+                if self._step(best, step) and self.criterion(step) < self.criterion(better):
+                    better = step
+            if better == best:
+                return best
+            best = better
+
+    def criterion(self, structure: Structure) -> float:
+        """Bayesian information criterion, summed over the tests; infinite for what is not admitted."""
+        if not self.wanted.admits(structure):
+            return np.inf
+        return sum(map(self._criterion_of, range(len(self.tests)), self.fits[structure]))
+
+    def white(self, structure: Structure) -> bool:
+        """Whether a structure leaves nothing to explain in any test."""
+        pairs = zip(self.tests, self.fits[structure], strict=True)
+        return all(test.exact(fit) or test.correlation(fit) < max(WHITE, test.chance) for test, fit in pairs)
+
+    def _path(self) -> list[Structure]:
+        """Structures that grow by one zero mode and one pole mode at a time; those admitted are never none."""
+        zero_modes, pole_modes = self.wanted.modes or (MOST_MODES, MOST_MODES)
+        real_zeros, real_poles = self.wanted.real or (0, 0)
+        integrators = [q for q in range(3) if self.wanted.integrators in (None, q)]
+        path: list[Structure] = []
+        fruitless, last = 0, None
+        for n in range(max(zero_modes, pole_modes) + 1):
+            zeros, poles = 2 * min(n, zero_modes) + real_zeros, 2 * min(n, pole_modes) + real_poles
+            row = [Structure(q, zeros, poles) for q in integrators]
+            row = [structure for structure in row if structure.proper and self._affordable(structure)]
+            if not row:
+                continue
+            leader: Structure | None = None
+            for structure in row:
+                self._fit(structure, leader)
+                leader = min(leader or structure, structure, key=self._deviance)
+            assert leader is not None
+            path.append(leader)
+            self._shed(leader)
+            if len(path) > 1:
+                limit = self._deviance(leader) + BEHIND * sum(test.omega.size for test in self.tests)
+                row = [structure for structure in row if self._deviance(structure) < limit]
+            integrators = [structure.integrators for structure in sorted(row, key=self._deviance)]
+            best = min(self.fits, key=self.criterion)
+            if self.wanted.admits(best):
+                fruitless = 0 if best != last else fruitless + 1
+                if fruitless and (self.white(best) or fruitless == FRUITLESS):
+                    break
+            last = best
+        if not any(self.wanted.admits(structure) for structure in path):
+            self._refuse()
+        return path
+
+    def _fit(self, structure: Structure, rival: Structure | None) -> None:
+        """Each test on its own; one that another test's parameters explain as well needs no guesses of its own.
+
+        The search for guesses ends early where they stay far behind a rival structure.
+        """
+        below = self.fits.get(Structure(structure.integrators, structure.zeros - 2, structure.poles - 2))
+        enough = [fit.deviance for fit in self.fits[rival]] if rival else [np.inf] * len(self.tests)
+        fits: list[Likely] = []
+        for i, test in enumerate(self.tests):
+            leader = min(range(i), key=lambda k: fits[k].deviance / self.tests[k].omega.size, default=None)
+            fit = test.follow(self.tests[leader], fits[leader]) if leader is not None else None
+            if fit is None or leader is None or not test.as_well(fit, self.tests[leader], fits[leader]):
+                own = test.fit(structure, below[i] if below else None, enough[i])
+                fit = own if fit is None or own.deviance < fit.deviance else fit
+            fits.append(fit)
+            self.tick()
+        leader = min(range(len(fits)), key=lambda k: fits[k].deviance / self.tests[k].omega.size)
+        for i, test in enumerate(self.tests):
+            if not test.as_well(fits[i], self.tests[leader], fits[leader]):
+                fits[i] = min(fits[i], test.follow(self.tests[leader], fits[leader]), key=lambda fit: fit.deviance)
+        self.fits[structure] = fits
+
+    def _shed(self, here: Structure) -> None:
+        """Fit what is left of a structure without the roots that the first test puts far outside the band."""
+        first = self.tests[0]
+        left = within_band(self.fits[here][0], first.omega)
+        if left is None or left[0] in self.fits or not self.wanted.admits(left[0]):
+            return
+        fit = first.pursue(left[0], [left[1]], self.fits[here][0], np.inf)
+        self.fits[left[0]] = [fit, *(test.follow(first, fit) for test in self.tests[1:])]
+
+    def _step(self, here: Structure, there: Structure) -> bool:
+        """Fit a neighbour from the parameters of ``here``; False when the first tests say that it is worse."""
+        fits: list[Likely] = []
+        lost = 0.0
+        for i, (test, known) in enumerate(zip(self.tests, self.fits[here], strict=True)):
+            penalty = (there.size - here.size) * self._penalty(i)
+            enough = known.deviance - self.overdispersion * (penalty - HOPELESS)
+            found = test.pursue(there, reached_from(known, there, test.omega), known, enough)
+            fits.append(found)
+            lost += self._criterion_of(i, found) - self._criterion_of(i, known)
+            self.tick()
+            if lost > HOPELESS:
+                return False
+        self.fits[there] = fits
+        return True
+
+    def _criterion_of(self, i: int, fit: Likely) -> float:
+        """The criterion of one test; the noise has two parameters. Infinite where a mode pair explains one line."""
+        if has_needle(fit, self.tests[i].omega):
+            return np.inf
+        return fit.deviance / self.overdispersion + (fit.structure.size + 2) * self._penalty(i)
+
+    def _deviance(self, structure: Structure) -> float:
+        return sum(fit.deviance for fit in self.fits[structure])
+
+    def _penalty(self, i: int) -> float:
+        """Of one parameter: the logarithm of how many numbers a test is, two a line."""
+        return float(np.log(2 * self.tests[i].omega.size))
+
+    def _affordable(self, structure: Structure) -> bool:
+        """Whether every test has twice as many numbers as there are parameters."""
+        return all(test.omega.size >= structure.size + 2 for test in self.tests)
+
+    def _refuse(self) -> None:
+        shortest = min(self.tests, key=lambda test: test.omega.size)
+        modes, real = self.wanted.modes or (0, 0), self.wanted.real or (0, 0)
+        least = Structure(self.wanted.integrators or 0, 2 * modes[0] + real[0], 2 * modes[1] + real[1])
+        if self.wanted.modes is not None and least.size + 2 > shortest.omega.size:
+            raise InputError(
+                f"{shortest.name}: holds {shortest.omega.size} lines; expected {least.size + 2} or more for {least}"
+            )
+        raise InputError(f"{least} make an improper plant; expected no more zeros than poles and integrators")

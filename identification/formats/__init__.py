@@ -1,0 +1,1 @@
+"""Tool: CSV, MAT and universal files -> tables of columns."""

@@ -1,0 +1,1 @@
+"""Tool: the plant, its structure, its bound, and model.json."""

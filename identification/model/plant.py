@@ -1,0 +1,219 @@
+"""The plant of Thesis Eq. (2.20) and the additive bound of (2.22), each as gain, modes and exact delay."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from identification.base.arrays import Complex
+from identification.base.errors import InputError
+
+
+def _finite(**numbers: float) -> None:
+    for name, number in numbers.items():
+        if not (isinstance(number, int | float) and math.isfinite(number)):
+            raise InputError(f"{name} is {number!r}; expected a finite real number")
+
+
+def _positive(**numbers: float) -> None:
+    _finite(**numbers)
+    for name, number in numbers.items():
+        if number <= 0:
+            raise InputError(f"{name} is {number:g}; expected a positive number")
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One factor 1 + 2 zeta s/omega + (s/omega)^2, normalised to 1 at s = 0.
+
+    Parameters
+    ----------
+    omega
+        Natural frequency in rad/s, positive.
+    zeta
+        Damping ratio, positive: the factor's roots lie in the open left half plane.
+    """
+
+    omega: float
+    zeta: float
+
+    def __post_init__(self) -> None:
+        _positive(omega=self.omega, zeta=self.zeta)
+
+    def __call__(self, s: ArrayLike) -> Complex:
+        """Evaluate the factor at complex frequencies ``s`` (any shape, rad/s)."""
+        x: Complex = np.asarray(s, dtype=np.complex128) / self.omega
+        return np.asarray(1 + (2 * self.zeta + x) * x)
+
+    @property
+    def roots(self) -> tuple[complex, complex]:
+        """The two roots in rad/s, conjugate (zeta < 1) or real."""
+        spread = np.sqrt(complex(self.zeta**2 - 1))
+        # Vieta for the small one: -zeta + spread cancels when zeta is large.
+        far = -self.zeta - spread
+        return complex(self.omega * far), complex(self.omega / far)
+
+
+@dataclass(frozen=True)
+class PlantModel:
+    """P(s) = gain/s^integrators * prod(zeros)/prod(poles) * exp(-delay_s s), Thesis Eq. (2.20) and (3.1).
+
+    The thesis's class has one integrator and complex modes only; real rigs also have none or two, and a real
+    pole or zero. Every factor is 1 at s = 0.
+
+    Parameters
+    ----------
+    gain
+        K in output units per input unit and second^integrators, not zero; its sign is the plant's.
+    zero_modes, pole_modes
+        Anti-resonances and resonances.
+    delay_s
+        The dead time h = T_d in seconds, not negative. Evaluated exactly, never as a rational function.
+    integrators
+        0, 1 or 2.
+    real_zeros, real_poles
+        Rates a > 0 in rad/s of factors 1 + s/a.
+
+    Raises
+    ------
+    InputError
+        A number is out of its range, or there are more zeros than poles.
+    """
+
+    gain: float
+    zero_modes: tuple[Mode, ...]
+    pole_modes: tuple[Mode, ...]
+    delay_s: float
+    integrators: int = 1
+    real_zeros: tuple[float, ...] = ()
+    real_poles: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        _finite(gain=self.gain, delay_s=self.delay_s)
+        if self.gain == 0:
+            raise InputError("the plant's gain is 0; expected any other number")
+        if self.delay_s < 0:
+            raise InputError(f"delay_s is {self.delay_s:g}; expected zero or a positive number of seconds")
+        if isinstance(self.integrators, bool) or self.integrators not in (0, 1, 2):
+            raise InputError(f"integrators is {self.integrators!r}; expected 0, 1 or 2")
+        _positive_rates(real_zeros=self.real_zeros, real_poles=self.real_poles)
+        if self.relative_degree < 0:
+            zeros = 2 * len(self.zero_modes) + len(self.real_zeros)
+            poles = zeros + self.relative_degree
+            raise InputError(f"the plant has {zeros} zeros and {poles} poles; expected no more zeros than poles")
+
+    @property
+    def relative_degree(self) -> int:
+        """Poles, integrators among them, less zeros."""
+        modes = len(self.pole_modes) - len(self.zero_modes)
+        return self.integrators + 2 * modes + len(self.real_poles) - len(self.real_zeros)
+
+    def __call__(self, s: ArrayLike) -> Complex:
+        """Evaluate P at complex frequencies ``s`` (any shape, rad/s), mode by mode."""
+        s = np.asarray(s, dtype=np.complex128)
+        lead = self.gain / s**self.integrators * np.exp(-self.delay_s * s)
+        return np.asarray(lead * _quotient(self.zero_modes, self.real_zeros, self.pole_modes, self.real_poles, s))
+
+    def without_delay(self) -> PlantModel:
+        """The delay-free factor G(s) of chapter 2."""
+        return replace(self, delay_s=0.0)
+
+
+@dataclass(frozen=True)
+class AdditiveBound:
+    """W_a(s) = gain * prod(zeros)/prod(poles), stable and minimum phase, Thesis Eq. (2.22) in general.
+
+    (2.22) itself has one real zero and one resonance, see :meth:`printed_form`.
+
+    Parameters
+    ----------
+    gain
+        |W_a(0)| in the plant's units, positive.
+    zero_modes, pole_modes
+        Pairs of zeros and of poles.
+    real_zeros, real_poles
+        Rates a > 0 in rad/s of factors 1 + s/a.
+
+    Raises
+    ------
+    InputError
+        A number is out of its range, there is no pole, or there are more zeros than poles.
+    """
+
+    gain: float
+    zero_modes: tuple[Mode, ...]
+    pole_modes: tuple[Mode, ...]
+    real_zeros: tuple[float, ...] = ()
+    real_poles: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        _positive(gain=self.gain)
+        _positive_rates(real_zeros=self.real_zeros, real_poles=self.real_poles)
+        zeros = 2 * len(self.zero_modes) + len(self.real_zeros)
+        if not max(1, zeros) <= self.order:
+            raise InputError(
+                f"the bound has {zeros} zeros and {self.order} poles; expected one pole or more and no more zeros"
+            )
+
+    @classmethod
+    def printed_form(cls, gain: float, corner: float, omega: float, zeta: float) -> AdditiveBound:
+        """gain (1 + s/corner) / (1 + 2 zeta s/omega + (s/omega)^2), Thesis Eq. (2.22)."""
+        return cls(gain, (), (Mode(omega, zeta),), (corner,))
+
+    @property
+    def order(self) -> int:
+        """Number of poles."""
+        return 2 * len(self.pole_modes) + len(self.real_poles)
+
+    @property
+    def is_printed_form(self) -> bool:
+        """Whether it has one real zero and one pair of poles, as (2.22) has."""
+        counts = (len(self.zero_modes), len(self.pole_modes), len(self.real_zeros), len(self.real_poles))
+        return counts == (0, 1, 1, 0)
+
+    @property
+    def corner(self) -> float:
+        """Frequency in rad/s of the slowest zero, in (2.22) the only one; of the fastest pole where there is none."""
+        zeros = [*self.real_zeros, *(mode.omega for mode in self.zero_modes)]
+        return min(zeros) if zeros else max(*self.real_poles, *(mode.omega for mode in self.pole_modes), 0.0)
+
+    @property
+    def resonance(self) -> Mode:
+        """The least damped pair of poles, in (2.22) the only one; without pairs, zeta = 1 at the slowest pole."""
+        if self.pole_modes:
+            return min(self.pole_modes, key=lambda mode: mode.zeta)
+        return Mode(min(self.real_poles), 1.0)
+
+    def __call__(self, s: ArrayLike) -> Complex:
+        """Evaluate W_a at complex frequencies ``s`` (any shape, rad/s)."""
+        s = np.asarray(s, dtype=np.complex128)
+        shape = _quotient(self.zero_modes, self.real_zeros, self.pole_modes, self.real_poles, s)
+        return np.asarray(self.gain * shape)
+
+
+def _positive_rates(**rates: tuple[float, ...]) -> None:
+    for name, values in rates.items():
+        for value in values:
+            _positive(**{f"a number of {name}": value})
+
+
+def _quotient(
+    zero_modes: tuple[Mode, ...],
+    real_zeros: tuple[float, ...],
+    pole_modes: tuple[Mode, ...],
+    real_poles: tuple[float, ...],
+    s: Complex,
+) -> Complex:
+    value: Complex = np.ones_like(s)
+    for mode in zero_modes:
+        value = value * mode(s)
+    for mode in pole_modes:
+        value = value / mode(s)
+    for rate in real_zeros:
+        value = value * (1 + s / rate)
+    for rate in real_poles:
+        value = value / (1 + s / rate)
+    return value

@@ -1,0 +1,219 @@
+"""What a fit has to say: the facts that model.json records and the table that a terminal shows."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from math import floor, log10
+from typing import Any
+
+from identification.base.digits import lower_end
+from identification.bound.bound_residuals import BoundReport
+from identification.fitting.first_guess import BOUNDS
+from identification.fitting.fit_plant import FitResult
+from identification.fitting.single_test_fit import OneFit
+from identification.fitting.subspace_check import SubspaceCheck
+from identification.model.model_file import plant_to_dict
+from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.structure import in_physical_units
+from identification.sweeps.response import FrequencyResponse
+
+WIDTHS = (28, 12, 26, 11, 11)  # of the columns, at least
+POOR = 0.15  # median distance of a test from its own fit
+
+
+def standard_errors(result: FitResult) -> dict[str, Any]:
+    """The standard errors of the nominal plant in the shape and units of model.json's ``plant``."""
+    return result.structure.to_dict(in_physical_units(result.nominal.theta, result.nominal.errors))
+
+
+def fit_to_dict(result: FitResult) -> dict[str, Any]:
+    """The facts of a fit that model.json records."""
+    lower, upper = result.nominal.intervals
+    shaped = result.structure.to_dict
+    how = (
+        "each test on its own; mean of the logarithms, mean delay" if result.nominal.scattered else "one plant for all"
+    )
+
+    def errors(theta: Any) -> dict[str, Any] | None:
+        return None if theta is None else shaped(in_physical_units(result.nominal.theta, theta))
+
+    return {
+        "structure": str(result.structure),
+        "method": f"maximum likelihood, {how}",
+        "loss": "soft-L1" if result.soft else "least squares",
+        "criterion": {
+            "name": "BIC",
+            "overdispersion": result.overdispersion,
+            "by_structure": {str(structure): value for structure, value in result.criterion.items()},
+        },
+        "intervals_95": {"lower": shaped(lower), "upper": shaped(upper)},
+        "noise_standard_errors": errors(result.nominal.noise),
+        "misfit_standard_errors": errors(result.nominal.misfit),
+        "scatter_standard_errors": errors(result.nominal.scatter),
+        "agreement_of_tests": result.nominal.agreement,
+        "tests": [_test_to_dict(test) for test in result.tests],
+    }
+
+
+def _test_to_dict(test: OneFit) -> dict[str, Any]:
+    return {
+        "name": test.name,
+        "lines": test.lines,
+        "plant": plant_to_dict(test.plant),
+        "standard_errors": test.structure.to_dict(in_physical_units(test.theta, test.errors)),
+        "noise": {"floor": test.floor, "relative": test.relative},
+        "chi_square": test.chi_square,
+        "residual_correlation": test.correlation,
+        "median_distance": test.distance,
+    }
+
+
+def facts(
+    tests: Sequence[FrequencyResponse], result: FitResult, report: BoundReport, checks: Mapping[str, SubspaceCheck]
+) -> dict[str, Any]:
+    """The ``fit`` object of model.json: the fit, its tests' files, and how W_a lies over the residuals."""
+    content = fit_to_dict(result)
+    for entry, test in zip(content["tests"], tests, strict=True):
+        entry["sha256"] = None if test.path is None else hashlib.sha256(test.path.read_bytes()).hexdigest()
+        entry["synthetic"] = test.synthetic
+    return {
+        "source": "identification fit",
+        "synthetic": any(test.synthetic for test in tests),
+        **content,
+        "bound": {
+            "order": report.bound.order,
+            "largest_excess": report.largest_excess,
+            "mean_excess": report.mean_excess,
+            "least_excess": report.least_excess,
+            "at_lines": asdict(report.at_lines),
+            "between_lines": None if report.between_lines is None else asdict(report.between_lines),
+            "touches": [asdict(touch) for touch in report.touches],
+        },
+        "subspace_check": [{"test": name, **asdict(check), "said": str(check)} for name, check in checks.items()],
+    }
+
+
+def check_lines(checks: Mapping[str, SubspaceCheck]) -> list[str]:
+    """A line for each raw record that was checked."""
+    return [f"check of {name} by {check}" for name, check in checks.items()]
+
+
+def bound_text(bound: AdditiveBound) -> str:
+    """W_a(s) as a formula."""
+
+    def product(modes: Sequence[Mode], rates: Sequence[float]) -> str:
+        factors = [f"(1 + s/{rate:.4g})" for rate in rates]
+        factors += [f"(1 + 2 {mode.zeta:.4g} s/{mode.omega:.4g} + (s/{mode.omega:.4g})^2)" for mode in modes]
+        return " ".join(factors)
+
+    zeros, poles = product(bound.zero_modes, bound.real_zeros), product(bound.pole_modes, bound.real_poles)
+    several = len(bound.pole_modes) + len(bound.real_poles) > 1
+    return f"W_a = {bound.gain:.4g} {zeros}".rstrip() + (f" / [{poles}]" if several else f" / {poles}")
+
+
+def bound_remarks(report: BoundReport) -> list[str]:
+    """Sentences on how W_a lies over the residuals."""
+    first = report.touches[0]
+    where = "between the lines, where only its own fit speaks," if first.between_lines else "at a line"
+    least = lower_end(report.least_excess, 3)
+    return [
+        f"W_a is {report.mean_excess:.3g} times the residuals' envelope on average and {report.largest_excess:.3g} "
+        f"times at most; no W_a of order {report.bound.order} gets below {least}",
+        f"it touches the residual of {first.test} {where} at {first.omega:.4g} rad/s",
+    ]
+
+
+def parameter_rows(result: FitResult) -> list[tuple[str, float, float, float, float, float | None]]:
+    """For each parameter its label, estimate, both ends of its 95 % interval, and what noise and scatter alone give.
+
+    The last two are standard errors; the scatter's is None for one test. The noise's contains the misfit.
+    """
+    lower, upper = result.nominal.intervals
+    noise = in_physical_units(result.nominal.theta, (result.nominal.noise**2 + result.nominal.misfit**2) ** 0.5)
+    scatter = (
+        None if result.nominal.scatter is None else in_physical_units(result.nominal.theta, result.nominal.scatter)
+    )
+    return [
+        (
+            label,
+            value,
+            float(lower[k]),
+            float(upper[k]),
+            float(noise[k]),
+            None if scatter is None else float(scatter[k]),
+        )
+        for k, (label, value) in enumerate(result.structure.parameters(result.plant))
+    ]
+
+
+def remarks(result: FitResult) -> list[str]:
+    """Sentences on what the numbers rest on: structure, tests, residuals."""
+    count = len(result.tests)
+    said = [f"{result.structure}; {count} test{'s' if count > 1 else ''}"]
+    distance = 100 * max(test.distance for test in result.tests)
+    said.append(f"median distance of a test from its own fit: at most {distance:.2g} % of the response")
+    if count > 1 and result.nominal.scattered:
+        said.append("the tests differ by more than their noise: intervals by Student's distribution of the scatter")
+    elif count > 1:
+        said.append("the tests differ by no more than their noise: intervals by the noise")
+    correlation = max(test.correlation for test in result.tests)
+    if result.nominal.misfit.any():
+        said.append(
+            f"neighbouring residuals correlate by up to {correlation:.2f}: they are no noise but what this structure "
+            "leaves, and the intervals are widened for it"
+        )
+    if result.overdispersion > 1:
+        said.append(
+            f"the residuals never become noise, whatever the number of modes: their deviance is divided by "
+            f"{result.overdispersion:.3g} in the choice of the structure"
+        )
+    return said + cautions(result.plant, distance / 100)
+
+
+def cautions(plant: PlantModel, distance: float) -> list[str]:
+    """Sentences on what in a plant is at the edge of what can be said.
+
+    Parameters
+    ----------
+    plant
+        The nominal plant.
+    distance
+        The largest of the tests' median distances from their own fits, over the response.
+    """
+    said = []
+    if distance > POOR:
+        said.append(f"a median distance of {100 * distance:.2g} % is more than noise leaves on a plant of this class")
+    for kind, modes in (("zero", plant.zero_modes), ("pole", plant.pole_modes)):
+        for i, mode in enumerate(modes, 1):
+            if mode.zeta < 2 * BOUNDS[0]:
+                said.append(
+                    f"{kind} mode {i} has the least damping that is sought: a {kind} in the right half "
+                    "plane, which this class does not have, or one narrower than the lines lie apart"
+                )
+    if plant.delay_s == 0:
+        said.append("no dead time can be told from none")
+    return said
+
+
+def digits_of(value: float, width: float) -> int:
+    """Significant digits of a positive value that show two of the half width of its interval; 3 to 10."""
+    if not 0 < width < value:
+        return 3
+    return min(max(2 + floor(log10(value)) - floor(log10(width / 2)), 3), 10)
+
+
+def table(result: FitResult) -> str:
+    """Estimate, 95 % interval, and standard errors by noise and by scatter, a line for each parameter; remarks."""
+    rows = [("parameter", "estimate", "95 % interval", "noise", "scatter")]
+    for label, value, lower, upper, noise, scatter in parameter_rows(result):
+        digits = max(5, digits_of(max(abs(value), abs(lower), abs(upper)), upper - lower))
+        interval = f"{lower:.{digits}g} ... {upper:.{digits}g}"
+        rows.append(
+            (label, f"{value:.{digits}g}", interval, f"{noise:.2g}", "" if scatter is None else f"{scatter:.2g}")
+        )
+    shown = 5 if len(result.tests) > 1 else 4
+    widths = [max(least, *(2 + len(row[k]) for row in rows)) for k, least in enumerate(WIDTHS[:shown])]
+    lines = [row[0].ljust(widths[0]) + "".join(map(str.rjust, row[1:shown], widths[1:])) for row in rows]
+    return "\n".join([*lines, *remarks(result)])

@@ -1,0 +1,156 @@
+"""Draw the tests, the model and the residuals under their bound, panel by panel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullFormatter
+
+from identification.base.arrays import Real
+from identification.model.plant import AdditiveBound, PlantModel
+from identification.sweeps.response import FrequencyResponse
+
+MEASURED: dict[str, Any] = {
+    "color": "0.55",
+    "linestyle": "none",
+    "marker": ".",
+    "markersize": 2.5,
+    "markeredgewidth": 0,
+    "rasterized": True,
+}
+MODEL: dict[str, Any] = {"color": "#000000", "linewidth": 0.8}
+BOUND: dict[str, Any] = {"color": "#CC79A7", "linestyle": (0, (7, 2, 1.5, 2)), "linewidth": 1.4}
+TOUCH: dict[str, Any] = {
+    "color": "#D55E00",
+    "linestyle": "none",
+    "marker": "o",
+    "markersize": 5,
+    "markerfacecolor": "none",
+}
+POINTS = 3000  # of a line
+TURNS_DEG = (5, 10, 15, 30, 45, 90, 180, 360, 720, 1440)  # from one tick of a phase to the next
+MOST_TICKS = 8
+FEW = 100  # ratio of frequencies between which there are too few powers of ten
+CHANCE = 0.3  # % of the distances, the least, that a panel may leave out: single ones come near zero by chance
+
+
+def draw_fit(tests: Sequence[FrequencyResponse], plant: PlantModel, bound: AdditiveBound) -> Figure:
+    """Bode magnitude and phase of the tests (markers) and the model (line); residuals under W_a.
+
+    Parameters
+    ----------
+    tests
+        The responses that were fitted.
+    plant, bound
+        The model and its additive bound.
+
+    Returns
+    -------
+    Figure
+        Three panels, a to c, over omega in rad/s.
+    """
+    figure = Figure(figsize=(5.2, 6.2), layout="constrained")
+    magnitude, phase, distance = figure.subplots(3, 1, sharex=True)
+    draw_magnitude(magnitude, tests, plant)
+    draw_phase(phase, tests, plant)
+    draw_distance(distance, tests, plant, bound)
+    for panel, letter in zip((magnitude, phase, distance), "abc", strict=True):
+        panel.grid(which="both", linewidth=0.3, color="0.85")
+        panel.legend(loc="lower left", frameon=False, fontsize=8, markerscale=4)
+        panel.text(0.985, 0.95, f"({letter})", transform=panel.transAxes, ha="right", va="top")
+    figure.align_ylabels()
+    distance.set_xlabel(r"$\omega$ [rad/s]")
+    return figure
+
+
+def draw_magnitude(panel: Axes, tests: Sequence[FrequencyResponse], plant: PlantModel) -> None:
+    """Draw the magnitude in dB of the tests and, upon them, of the model."""
+    omega = _grid(panel, tests)
+    _scatter(panel, tests, [decibel(np.abs(test.response)) for test in tests], "measured")
+    panel.plot(omega, decibel(np.abs(plant(1j * omega))), **MODEL, label="model")
+    panel.set_ylabel("Magnitude [dB]")
+
+
+def draw_phase(panel: Axes, tests: Sequence[FrequencyResponse], plant: PlantModel) -> None:
+    """Draw the phase in degrees of the model, unwrapped, and, behind it, of the tests on the turn next to it."""
+    omega = _grid(panel, tests)
+    rational_rad = np.unwrap(np.angle(plant.without_delay()(1j * omega)))
+    phase_deg = np.degrees(rational_rad - plant.delay_s * omega)
+    measured_deg = [np.degrees(np.angle(test.response)) for test in tests]
+    turns = [
+        np.round((np.interp(test.omega, omega, phase_deg) - measured) / 360)
+        for test, measured in zip(tests, measured_deg, strict=True)
+    ]
+    _scatter(panel, tests, [a + 360 * n for a, n in zip(measured_deg, turns, strict=True)], "measured")
+    panel.plot(omega, phase_deg, **MODEL, label="model")
+    low, high = panel.get_ylim()
+    enough = [step for step in TURNS_DEG if (high - low) / step <= MOST_TICKS]
+    if enough:
+        panel.yaxis.set_major_locator(MultipleLocator(enough[0]))
+    panel.set_ylabel("Phase [deg]")
+
+
+def draw_distance(
+    panel: Axes,
+    tests: Sequence[FrequencyResponse],
+    plant: PlantModel,
+    bound: AdditiveBound,
+    touches_omega: Sequence[float] = (),
+) -> None:
+    """Draw |P - P_test| in dB of every test, |W_a| above them, and a ring where W_a touches them (rad/s)."""
+    omega = _grid(panel, tests)
+    distances = [decibel(np.abs(plant(1j * test.omega) - test.response)) for test in tests]
+    _scatter(panel, tests, distances, r"$|P - P_\mathrm{test}|$")
+    panel.plot(omega, decibel(np.abs(bound(1j * omega))), **BOUND, label="$|W_a|$")
+    if touches_omega:
+        at = np.array(touches_omega)
+        panel.plot(at, decibel(np.abs(bound(1j * at))), **TOUCH, label="touches")
+    _leave_out_least(panel, distances)
+    panel.set_ylabel("Distance [dB]")
+
+
+def draw_relative_distance(
+    panel: Axes, tests: Sequence[FrequencyResponse], plant: PlantModel, bound: AdditiveBound
+) -> None:
+    """Draw |P - P_test|/|P| in dB of every test and |W_a|/|P|; above 0 dB nothing is known of the plant."""
+    omega = _grid(panel, tests)
+    ratios = [decibel(np.abs(1 - test.response / plant(1j * test.omega))) for test in tests]
+    _scatter(panel, tests, ratios, r"$|P - P_\mathrm{test}|/|P|$")
+    panel.plot(omega, decibel(np.abs(bound(1j * omega) / plant(1j * omega))), **BOUND, label="$|W_a|/|P|$")
+    _leave_out_least(panel, ratios)
+    panel.set_ylabel("Relative distance [dB]")
+
+
+def decibel(magnitude: Real) -> Real:
+    """20 log10 of a magnitude; zero gives NaN, which is not drawn."""
+    return 20 * np.log10(np.where(magnitude > 0, magnitude, np.nan))
+
+
+def _grid(panel: Axes, tests: Sequence[FrequencyResponse]) -> Real:
+    """Make the panel's axis logarithmic, over the band of all tests, and return the points of its lines in rad/s.
+
+    Below two decades, powers of ten would be too few ticks.
+    """
+    low, high = min(test.omega[0] for test in tests), max(test.omega[-1] for test in tests)
+    panel.set_xscale("log")
+    panel.set_xlim(low, high)
+    panel.xaxis.set_minor_formatter(NullFormatter())
+    if high < FEW * low:
+        panel.xaxis.set_major_locator(
+            LogLocator(subs=(1, 2, 5)) if high > 5 * low else MaxNLocator(5, steps=[1, 2, 5, 10])
+        )
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda omega, _: f"{omega:g}"))
+    return np.geomspace(low, high, POINTS)
+
+
+def _scatter(panel: Axes, tests: Sequence[FrequencyResponse], values: Sequence[Real], label: str) -> None:
+    for i, (test, value) in enumerate(zip(tests, values, strict=True)):
+        panel.plot(test.omega, value, **MEASURED, label=None if i else label)
+
+
+def _leave_out_least(panel: Axes, values: Sequence[Real]) -> None:
+    panel.set_ylim(bottom=float(np.nanpercentile(np.concatenate(values), CHANCE, method="higher")))

@@ -1,0 +1,1 @@
+"""Tool: tables of columns -> the frequency response of each test."""

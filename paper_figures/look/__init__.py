@@ -1,0 +1,1 @@
+"""Tool: style, panels and captions of every figure."""

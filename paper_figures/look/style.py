@@ -1,0 +1,125 @@
+"""The look of every figure: sizes, the meaning of each line, and files of the same bytes on every run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import matplotlib.style
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from identification.base.files import write_whole
+
+COLUMN_WIDTH = 3.4
+"""Width of a figure that fills one column [in]."""
+
+FULL_WIDTH = 6.5
+"""Width of a figure that fills the page [in]."""
+
+STYLE_FILE = Path(__file__).with_name("figures.mplstyle")
+
+LINES: dict[str, dict[str, Any]] = {
+    "reference": {"color": "#000000", "linestyle": (0, (4, 2)), "linewidth": 0.7},
+    "measured": {"color": "#56B4E9", "linestyle": "none", "marker": "o", "markersize": 2.5},
+    "model": {"color": "#000000", "linestyle": "-", "linewidth": 1.2},
+    "without anti-windup": {"color": "#D55E00", "linestyle": (0, (5, 1.5)), "linewidth": 1.2},
+    "thesis anti-windup": {"color": "#0072B2", "linestyle": "-", "linewidth": 1.0},
+    "best of the thesis's form": {"color": "#0072B2", "linestyle": (0, (2.5, 1.2)), "linewidth": 1.0},
+    "corrected anti-windup": {"color": "#009E73", "linestyle": "-", "linewidth": 1.9},
+    "saturation limits": {"color": "#000000", "linestyle": (0, (1, 2)), "linewidth": 0.7},
+    "bound": {"color": "#CC79A7", "linestyle": (0, (7, 2, 1.5, 2)), "linewidth": 1.6},
+    "second-order Pade": {"color": "#E69F00", "linestyle": (0, (2.5, 1.2)), "linewidth": 1.4},
+    "family 1": {"color": "#4D4D4D", "linestyle": "-", "linewidth": 2.0},
+    "family 2": {"color": "#4D4D4D", "linestyle": (0, (6, 2)), "linewidth": 1.0},
+    "family 3": {"color": "#4D4D4D", "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 1.0},
+    "family 4": {"color": "#7F7F7F", "linestyle": "-", "linewidth": 0.8},
+    "family 5": {"color": "#7F7F7F", "linestyle": (0, (3, 1.5)), "linewidth": 1.0},
+    "family 6": {"color": "#7F7F7F", "linestyle": (0, (1, 1.2)), "linewidth": 1.2},
+}
+"""The style of each kind of line, as keywords of ``Axes.plot``.
+
+The family is one function at several values of a parameter, the first of them the chosen value.
+"""
+
+FAMILY = [name for name in LINES if name.startswith("family")]
+"""The entries of the family, in the order of its values."""
+
+_METADATA: dict[str, dict[str, None]] = {
+    "pdf": {"CreationDate": None, "ModDate": None},
+    "svg": {"Date": None},
+    "png": {"Software": None},
+}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Put the style in force for a ``with`` block, or for a function as the decorator ``@styled()``.
+
+    The user's own settings are set aside: the style starts from Matplotlib's defaults.
+    """
+    with matplotlib.style.context(["default", STYLE_FILE]):
+        yield
+
+
+@styled()
+def figure(width: float, height: float) -> Figure:
+    """Return an empty figure of print size that no window or global state knows of.
+
+    Parameters
+    ----------
+    width, height
+        Size on the page [in].
+
+    Notes
+    -----
+    Axes take their fonts from the style in force when they are added, so a drawing function as a whole
+    is decorated with :func:`styled`.
+    """
+    return Figure(figsize=(width, height))
+
+
+def panel_letters(axes: Iterable[Axes]) -> None:
+    """Write (a), (b), ... above the top left corner of each of the axes, in their order."""
+    for number, panel in zip(count(ord("a")), axes, strict=False):
+        panel.annotate(
+            f"({chr(number)})",
+            xy=(0, 1),
+            xycoords="axes fraction",
+            xytext=(0, 3),
+            textcoords="offset points",
+            fontsize=9,
+            ha="left",
+            va="bottom",
+        )
+
+
+def save(figure: Figure, folder: Path, name: str, caption: str) -> None:
+    """Write the figure as PDF, SVG and PNG and its caption as text: all four files, or none.
+
+    Parameters
+    ----------
+    figure
+        The figure; saving it again gives the same bytes.
+    folder
+        An existing folder.
+    name
+        File name without suffix.
+    caption
+        The caption, one paragraph.
+
+    Raises
+    ------
+    InputError
+        The folder does not exist or may not be written to.
+    """
+    writers: dict[Path, Callable[[Path], object]] = {
+        folder / f"{name}.{kind}": partial(figure.savefig, metadata=metadata) for kind, metadata in _METADATA.items()
+    }
+    writers[folder / f"{name}.txt"] = lambda path: path.write_text(caption + "\n", encoding="utf-8")
+    with styled():
+        write_whole(writers)

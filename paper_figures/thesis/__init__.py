@@ -1,0 +1,1 @@
+"""Thesis: its figures and the report that judges it."""

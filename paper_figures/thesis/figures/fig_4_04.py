@@ -1,0 +1,46 @@
+"""Thesis Fig. 4.4: controller output and plant input under input saturation with the extended anti-windup."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from paper_figures.look import panels
+from paper_figures.look.captions import largest, last_saturated, of_run, promises
+from paper_figures.look.panels import CORRECTED, THESIS
+from paper_figures.look.style import FULL_WIDTH, styled
+from paper_figures.thesis.figures.shared_chapter_4 import beginning, chosen_limit
+
+TABLES: tuple[str, ...] = ("extended", "extended_summary")
+
+
+def caption(tables: Mapping[str, pd.DataFrame]) -> str:
+    """Return the caption with the numbers of the tables."""
+    table, summary = tables["extended"], tables["extended_summary"]
+    thesis, corrected = (
+        f"|u| reaches {largest(table[f'control_{run}'])} and u "
+        f"{last_saturated(of_run(summary, run, 'last_saturation_s'))}"
+        for run in ("thesis", "corrected")
+    )
+    return (
+        "Controller output and plant input in the runs of Fig. 4.3 (thesis Fig. 4.4): (a) controller output u, (b) "
+        "plant input sat(u) and (c) both at the beginning with the thesis's theta1~; (d) to (f) the same with the "
+        "corrected one, which has theta1~(0) = -1; dotted: the limits, in the thesis red dashed. "
+        f"{promises(summary)} The text says that the damaging effects of the saturation are resolved. With the "
+        f"thesis's theta1~ {thesis}; with the corrected one {corrected}. {chosen_limit(tables)}"
+    )
+
+
+@styled()
+def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
+    """Return the figure: a column for each anti-windup; controller output, plant input, and both enlarged."""
+    axes = panels.lettered(FULL_WIDTH, 5.2, "ad;be;cf")
+    limit = of_run(tables["extended_summary"], "none", "limit")
+    for (above, middle, below), run in zip((("a", "b", "c"), ("d", "e", "f")), (THESIS, CORRECTED), strict=True):
+        panels.controls(axes[above], tables["extended"], run, limit, "control")
+        panels.controls(axes[middle], tables["extended"], run, limit, "saturated")
+        panels.controls(axes[below], tables["extended"], run, limit, "control", "saturated")
+        axes[below].set_xlim(0, beginning(tables, "thesis", "corrected"))
+    return panels.finished(axes, "ad", "be", "cf")

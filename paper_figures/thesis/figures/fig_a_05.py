@@ -1,0 +1,138 @@
+"""Fig. A.5: what a computer and a real actuator make of the extended loop, over time and over the sampling rate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from paper_figures.look import panels
+from paper_figures.look.captions import duration, number, only, sampling_rate, settled
+from paper_figures.look.panels import CORRECTED, NONE, THESIS
+from paper_figures.look.style import FULL_WIDTH, LINES, styled
+
+TABLES: tuple[str, ...] = ("sampled", "sampled_summary")
+
+RUNS = (CORRECTED, THESIS, NONE)
+CONTINUOUS = "continuous"
+METHODS = {"tustin": ("Tustin's rule", "o"), "exact": ("held inputs", "s")}
+MARKER = 3.5
+BROAD = "#CCCCCC"
+DECADES = 8
+DIVERGENT = 100.0  # a run whose error exceeds another's by more than this leaves the panels
+
+
+def caption(tables: Mapping[str, pd.DataFrame]) -> str:
+    """Return the caption with the numbers of the tables."""
+    summary = tables["sampled_summary"]
+    rates = np.unique(summary["rate_hz"].dropna())
+    quantum = only(summary, "quantum")
+    samples = [number(rate * 2 * math.pi / only(summary, "root")) for rate in rates[[0, -1]]]
+    levels = round(2 * only(summary, "limit") / quantum)
+    tustin, held = (
+        " and ".join(_size(_of(summary, "corrected", method, rate, "steady_error")) for rate in rates[[0, -1]])
+        for method in METHODS
+    )
+    shown, slowest, fastest = (sampling_rate(hertz) for hertz in (only(summary, "shown_hz"), *rates[[0, -1]]))
+    lasting = _size(_of(summary, "thesis", CONTINUOUS, math.nan, "steady_error"))
+    ends = [
+        settled(_of(summary, "corrected", method, rate, "settling_s"))
+        for method, rate in ((CONTINUOUS, math.nan), ("tustin", only(summary, "shown_hz")))
+    ]
+    return (
+        "What a real drive makes of the loop with dead time (not in the thesis): the controller on a computer, and an "
+        f"actuator with the limits +-{number(only(summary, 'limit'))}, {levels} steps of {number(quantum, 2)} between "
+        f"them, {duration(only(summary, 'full_range_s'))} to go from one to the other, and a sample late. (a) "
+        "The greatest error from t0 on; broad, in continuous time; thin, with the drive at "
+        f"{shown}, its controller by Tustin's rule. With the corrected anti-windup the "
+        f"error {ends[0]} in continuous time and {ends[1]} with the drive (to 1 % of the reference's amplitude around "
+        f"its offset). (b) The greatest error of the last period ({number(only(summary, 'period_s'))} s) over the "
+        f"sampling rate, {samples[0]} to {samples[1]} samples in a period of the controller's fastest root, "
+        f"{number(only(summary, 'root'))} rad/s; dotted, the rate of (a). A block whose input is held answers half a "
+        "sample late, which takes the model of the reference out of place by the sample time, Tustin's rule by its "
+        f"square: with the corrected anti-windup the error at {slowest} and {fastest} is "
+        f"{held} with held inputs, {tustin} with Tustin's rule, part of which is the actuator's steps. The offset "
+        f"of the thesis's anti-windup, {lasting} in continuous time, stays.{_divergent(summary)}"
+    )
+
+
+def _of(summary: pd.DataFrame, run: str, method: str, rate_hz: float, column: str) -> float:
+    """The value of a column for a run, a method and a rate; NaN is the rate of continuous time."""
+    rows = summary[(summary["run"] == run) & (summary["method"] == method)]
+    if not math.isnan(rate_hz):
+        rows = rows[np.isclose(rows["rate_hz"], rate_hz, rtol=1e-6)]
+    return float(rows[column].iloc[0])
+
+
+def _size(error: float) -> str:
+    return "unbounded" if math.isnan(error) else number(error)
+
+
+def _divergent(summary: pd.DataFrame) -> str:
+    """Which of the runs with a drive are not there because they diverge."""
+    gone = summary[summary["steady_error"].isna() & summary["rate_hz"].notna()]
+    labels = {run.name: run.label for run in RUNS}
+    said = [
+        f"{labels[str(row.run)]}, {METHODS[str(row.method)][0]}, {sampling_rate(float(str(row.rate_hz)))}"
+        for row in gone.itertuples()
+    ]
+    return f" Not drawn, since it diverges: {'; '.join(said)}." if said else ""
+
+
+@styled()
+def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
+    """Return the figure; both panels have the same view, and (a) ends where (b) reads it."""
+    table, summary = tables["sampled"], tables["sampled_summary"]
+    axes = panels.lettered(FULL_WIDTH, 2.9, "ab")
+    time_s = table["time_s"].to_numpy(float)
+    tails = {column: _tail(table[column].to_numpy(float)) for column in table if column != "time_s"}
+    for order, run in enumerate(RUNS):
+        line = LINES[run.kind]
+        axes["a"].plot(*panels.envelope(time_s, tails[f"error_{run.name}"]), **panels.band(line))
+        drive = panels.envelope(time_s, tails[f"error_{run.name}_drive"])
+        axes["a"].plot(*drive, **(line | {"linewidth": 1.0}), label=run.label, zorder=3 + order)
+    axes["a"].plot([], [], color=BROAD, linewidth=4.0, label="continuous time")
+    axes["a"].set(xlabel="Time $t_0$ [s]", ylabel=r"$\max_{t \geq t_0}\,|e(t)|$")
+    axes["a"].set_xlim(0, time_s[-1] - only(summary, "period_s"))
+    axes["a"].legend(**panels.ABOVE, ncols=2)
+    _over_rate(axes["b"], summary)
+    peaks = np.array([tail[0] for tail in tails.values() if np.isfinite(tail[0])])
+    top = 2 * min(peaks.max(), DIVERGENT * peaks.min()) if len(peaks) else 1.0
+    least = float(summary["steady_error"][summary["rate_hz"].notna()].min())
+    bottom = max(least / 3, top / 10**DECADES) if 3 * top > least else top / 10**DECADES
+    for panel in axes.values():
+        panel.set(yscale="log", ylim=(bottom, top))
+    figure = axes["a"].get_figure(root=True)
+    assert figure is not None
+    return figure
+
+
+def _tail(error: np.ndarray) -> np.ndarray:
+    """The greatest |error| from each sample on; NaN for a run that diverges."""
+    return np.asarray(np.maximum.accumulate(np.abs(error[::-1]))[::-1])
+
+
+def _over_rate(panel: Axes, summary: pd.DataFrame) -> None:
+    """The error of the last period: a line a run and a marker a method; broad, in continuous time."""
+    ends = (summary["rate_hz"].min(), summary["rate_hz"].max())
+    for order, run in enumerate(RUNS):
+        line = LINES[run.kind]
+        panel.plot(ends, [_of(summary, run.name, CONTINUOUS, math.nan, "steady_error")] * 2, **panels.band(line))
+        for method, (_, marker) in METHODS.items():
+            rows = summary[(summary["run"] == run.name) & (summary["method"] == method)]
+            face = line["color"] if method == "tustin" else "#FFFFFF"
+            look = line | {"marker": marker, "markersize": MARKER, "markerfacecolor": face, "zorder": 3 + order}
+            panel.plot(rows["rate_hz"], rows["steady_error"], **look)
+    for method, (label, marker) in METHODS.items():
+        face = "#000000" if method == "tustin" else "#FFFFFF"
+        look = {"color": "#000000", "linestyle": "none", "marker": marker, "markersize": MARKER}
+        panel.plot([], [], **look, markerfacecolor=face, label=label)
+    panel.axvline(only(summary, "shown_hz"), **LINES["family 6"])
+    panel.set(xscale="log", xlabel="Sampling rate [Hz]", ylabel=r"$\max\,|e(t)|$, last period")
+    panel.xaxis.set_minor_formatter(NullFormatter())
+    panel.legend(**panels.ABOVE, ncols=2)

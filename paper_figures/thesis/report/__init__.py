@@ -1,0 +1,1 @@
+"""Thesis: verdicts, figures, ledger and audits on one HTML page."""
