@@ -178,22 +178,24 @@ def test_command_lists_what_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("experiments.thesis.claims.ledger.read_ledger", lambda: QUOTES)
     text, record = tmp_path / "text.md", tmp_path / "record.json"
     text.write_text(TEXT, encoding="utf-8")
-    result = CliRunner().invoke(main, ["coverage", str(text), "--record", str(record)])
+    result = CliRunner().invoke(main, ["thesis", "coverage", str(text), "--record", str(record)])
     assert result.exit_code == 1
     assert "line 4: 3.5 is quoted by no claim" in result.output
     assert json.loads(record.read_text(encoding="utf-8"))["statuses"]["left"] == 2
     text.write_text("The gain is 7.5 and the peak 3.5", encoding="utf-8")
-    assert "b: its quote does not stand in the text" in CliRunner().invoke(main, ["coverage", str(text)]).output
+    assert (
+        "b: its quote does not stand in the text" in CliRunner().invoke(main, ["thesis", "coverage", str(text)]).output
+    )
     clean = TEXT.replace("peak 3.5", "peak").replace("3 modes", "modes")
     text.write_text(clean, encoding="utf-8")
     monkeypatch.setattr(
         "experiments.thesis.claims.ledger.read_ledger",
         lambda: QUOTES.replace({"quote": {" peak 3.5": " peak"}}, regex=True),
     )
-    assert CliRunner().invoke(main, ["coverage", str(text)]).exit_code == 0
+    assert CliRunner().invoke(main, ["thesis", "coverage", str(text)]).exit_code == 0
 
 
 def test_command_refuses_a_missing_text(tmp_path: Path):
-    result = CliRunner().invoke(main, ["coverage", str(tmp_path / "absent.md")])
+    result = CliRunner().invoke(main, ["thesis", "coverage", str(tmp_path / "absent.md")])
     assert result.exit_code == 2
     assert "no such file" in result.output

@@ -163,7 +163,7 @@ def test_no_command_writes_over_what_it_reads(command: str, option: str, target:
     link = tmp_path / "link"
     link.symlink_to(target)
     for path in (target, link):
-        result = CliRunner().invoke(main, [command, *arguments, option, str(path)])
+        result = CliRunner().invoke(main, ["thesis", command, *arguments, option, str(path)])
         assert result.exit_code == 2
         assert "is an input too" in result.output
     assert target.read_bytes() == before
@@ -172,7 +172,7 @@ def test_no_command_writes_over_what_it_reads(command: str, option: str, target:
 
 def test_two_outputs_of_one_path_are_refused(small_ledger: Path):
     path = small_ledger / ".." / small_ledger.name / "claims.csv"
-    result = CliRunner().invoke(main, ["claims", "--output", str(small_ledger), "--page", str(path)])
+    result = CliRunner().invoke(main, ["thesis", "claims", "--output", str(small_ledger), "--page", str(path)])
     assert result.exit_code == 2
     assert "two of these are one file" in result.output
     assert not list(small_ledger.iterdir())
@@ -186,7 +186,7 @@ def small_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_command_writes_the_table_and_prints_counts(small_ledger: Path):
-    result = CliRunner().invoke(main, ["claims", "--output", str(small_ledger)])
+    result = CliRunner().invoke(main, ["thesis", "claims", "--output", str(small_ledger)])
     assert result.exit_code == 0
     assert [line.split() for line in result.output.splitlines()[1:]] == [["agrees", "1"], ["unchecked", "1"]]
     written = pd.read_csv(small_ledger / "claims.csv")
@@ -198,24 +198,24 @@ def test_command_names_the_rows_whose_status_is_out_of_date(tmp_path: Path, monk
     monkeypatch.setattr(
         "experiments.thesis.claims.ledger.read_ledger", lambda: one_row("19.659").assign(status="differs")
     )
-    result = CliRunner().invoke(main, ["claims", "--output", str(tmp_path)])
+    result = CliRunner().invoke(main, ["thesis", "claims", "--output", str(tmp_path)])
     assert result.exit_code == 0
     assert "theta2.gain: the ledger says differs, recomputed it agrees" in result.output
 
 
 def test_command_refuses_a_missing_folder(small_ledger: Path):
-    result = CliRunner().invoke(main, ["claims", "--output", str(small_ledger / "absent")])
+    result = CliRunner().invoke(main, ["thesis", "claims", "--output", str(small_ledger / "absent")])
     assert result.exit_code == 2
     assert "no such folder" in result.output
 
 
 def test_command_writes_the_page_and_the_table_or_neither(small_ledger: Path):
     page = small_ledger / "CLAIMS.md"
-    result = CliRunner().invoke(main, ["claims", "--output", str(small_ledger), "--page", str(page)])
+    result = CliRunner().invoke(main, ["thesis", "claims", "--output", str(small_ledger), "--page", str(page)])
     assert result.exit_code == 0
     assert "| `theta2.gain` | 19.659 | 19.659 |" in page.read_text(encoding="utf-8")
     (small_ledger / "claims.csv").unlink()
     nowhere = small_ledger / "absent" / "CLAIMS.md"
-    result = CliRunner().invoke(main, ["claims", "--output", str(small_ledger), "--page", str(nowhere)])
+    result = CliRunner().invoke(main, ["thesis", "claims", "--output", str(small_ledger), "--page", str(nowhere)])
     assert result.exit_code == 2
     assert not (small_ledger / "claims.csv").exists()

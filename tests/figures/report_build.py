@@ -40,7 +40,7 @@ def make_build(build: Path) -> None:
     for command, *arguments in (
         (identification, "fit", *SWEEPS, "--modes", 2, "--integrators", 1, "--output", build / "model.json"),
         (design, "extended", build / "model.json", *free, "--output", extended),
-        (experiments, "f-gamma", extended, "--output", results),
+        (experiments, "thesis", "f-gamma", extended, "--output", results),
         (command_line.main, "draw", *FIGURES[:-1], "--results", results, "--output", build / "figures"),
     ):
         result = invoke(command, *arguments)

@@ -221,8 +221,8 @@ def test_cells_are_escaped(table: pd.DataFrame) -> None:
 
 def test_command_writes_the_page(tmp_path: Path) -> None:
     page = tmp_path / "equations.md"
-    result = CliRunner().invoke(main, ["equations", "--page", str(page)])
+    result = CliRunner().invoke(main, ["thesis", "equations", "--page", str(page)])
     assert result.exit_code == 0, result.output
     assert page.read_text(encoding="utf-8") == (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
-    result = CliRunner().invoke(main, ["equations", "--page", str(tmp_path / "absent" / "equations.md")])
+    result = CliRunner().invoke(main, ["thesis", "equations", "--page", str(tmp_path / "absent" / "equations.md")])
     assert result.exit_code == 2

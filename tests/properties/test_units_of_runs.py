@@ -214,6 +214,7 @@ def test_the_commands_say_the_same(small_designs: dict[str, Design], units: Unit
         numbers = [facts["f"] / abs(each.gain), facts["f_omega"] * T, facts["popov_sector"] or 0.0]
         numbers += [facts["theta1_tilde_at_zero"], facts["recovery_s"] / T, facts["theta2_stable"]]
         options = ["--limit", repr(1.5 * abs(each.input)), "--until", repr(8 * T), "--amplitude", repr(5 * each.output)]
+        options += ["--phase", repr(math.pi / 2)]
         for more in (
             ["simulate", "--sample-time", repr(0.5 * T)],
             ["sampled", "--rate", repr(8 / T), "--method", "exact"],

@@ -85,7 +85,7 @@ def campaign(extended_design: Design, tmp_path_factory: pytest.TempPathFactory) 
     folder = tmp_path_factory.mktemp("campaign")
     design, output = folder / "design.json", folder / "campaign.parquet"
     design.write_text(extended_design.to_json(), encoding="utf-8")
-    arguments = ["campaign", str(design), "--plants", "40", "--seed", "1", "--output", str(output)]
+    arguments = ["thesis", "campaign", str(design), "--plants", "40", "--seed", "1", "--output", str(output)]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.output
     return output

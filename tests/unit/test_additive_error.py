@@ -36,6 +36,6 @@ def test_a_folder_and_a_file_of_two_tests(tmp_path: Path) -> None:
     folder.mkdir()
     output.mkdir()
     (folder / "two.csv").write_text("test,frequency_hz,magnitude_db,phase_deg\n" + "\n".join(rows), encoding="utf-8")
-    result = CliRunner().invoke(main, ["additive-error", "implied", str(folder), "--output", str(output)])
+    result = CliRunner().invoke(main, ["thesis", "additive-error", "implied", str(folder), "--output", str(output)])
     assert result.exit_code == 0, result.output
     assert pd.read_csv(output / "additive_error_summary.csv")["tests"].tolist() == [2]

@@ -37,7 +37,7 @@ from identification.model.plant import Mode, PlantModel
 
 ROOT = Path(__file__).resolve().parents[2]
 PLANTS, LIMIT = 24, 12.0
-ARGUMENTS = ["--plants", str(PLANTS), "--seed", "1", "--limit", str(LIMIT)]
+ARGUMENTS = ["--plants", str(PLANTS), "--seed", "1", "--limit", str(LIMIT), "--amplitude", "50"]
 
 
 def far_from(plant: PlantModel, random: np.random.Generator) -> PlantModel:
@@ -96,7 +96,8 @@ def test_another_integrator_is_refused(extended_design: Design) -> None:
 
 @pytest.fixture(scope="module")
 def campaign(extended_design: Design) -> Campaign:
-    return Campaign(extended_design, "of a test", 1, LIMIT, code_sha256())
+    reference = thesis_reference("extended", extended_design.reference_omegas)
+    return Campaign(extended_design, "of a test", 1, reference, LIMIT, 5, code_sha256())
 
 
 def test_rows_are_those_of_single_runs(campaign: Campaign, extended_design: Design) -> None:
@@ -237,7 +238,10 @@ def test_the_file(folder: Path, whole: bytes, extended_design: Design) -> None:
 @pytest.mark.usefixtures("small_chunks")
 def test_a_killed_command_goes_on(folder: Path, whole: bytes) -> None:
     parts = folder / "resumed.parquet.parts"
-    code = "from experiments.campaign import checkpoint; checkpoint.CHUNK = 2; from experiments.__main__ import main; main()"
+    code = (
+        "from experiments.campaign import checkpoint; checkpoint.CHUNK = 2; "
+        "from experiments.__main__ import main; main()"
+    )
     command = ["campaign", str(folder / "design.json"), *ARGUMENTS, "--output", str(folder / "resumed.parquet")]
     with subprocess.Popen([sys.executable, "-c", code, *command], cwd=ROOT) as process:
         wait_for_parts(parts, 2)

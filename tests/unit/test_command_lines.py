@@ -44,8 +44,9 @@ def refused(result: Result, *parts: str) -> None:
         assert part in lines[0]
 
 
+EPSILON = ["--epsilon", "1e-4"]
 DESIGN_COMMANDS = {
-    "delay-free": ["--period", "4"],
+    "delay-free": ["--period", "4", *EPSILON],
     "extended": ["--reference-omega", "1.5", "--a", "4", "--e", "2", "--f", "1"],
 }
 
@@ -82,7 +83,7 @@ def test_design_refuses_bad_plants(runner: CliRunner, tmp_path: Path, member: st
     model = tmp_path / "model.json"
     model.write_text(json.dumps(content), encoding="utf-8")
     output = tmp_path / "design.json"
-    result = runner.invoke(design_main, ["delay-free", str(model), "--period", "4", "--output", str(output)])
+    result = runner.invoke(design_main, ["delay-free", str(model), "--period", "4", *EPSILON, "--output", str(output)])
     refused(result, "model.json", part)
     assert not output.exists()
 
@@ -90,14 +91,14 @@ def test_design_refuses_bad_plants(runner: CliRunner, tmp_path: Path, member: st
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (["delay-free", "implied", "--period", "-4"], "period"),
-        (["delay-free", "implied", "--period", "nan"], "period"),
+        (["delay-free", "implied", "--period", "-4", *EPSILON], "period"),
+        (["delay-free", "implied", "--period", "nan", *EPSILON], "period"),
         (["delay-free", "implied", "--period", "4", "--epsilon", "99"], "epsilon"),
         (["extended", "implied", "--reference-omega", "0", "--a", "4", "--e", "2", "--f", "1"], "0 frequencies above"),
         (["extended", "implied", "--reference-omega", "-1", "--a", "4", "--e", "2", "--f", "1"], "omega >= 0"),
         (["extended", "implied", "--reference-omega", "1.5", "--a", "4", "--e", "2"], "--f 0 times"),
-        (["delay-free", "implied", "--period", "4", "--sector", "1"], "0 < sector < 1"),
-        (["delay-free", "implied", "--period", "4", "--bandwidth", "0.1"], "bandwidth of the anti-windup"),
+        (["delay-free", "implied", "--period", "4", *EPSILON, "--sector", "1"], "0 < sector < 1"),
+        (["delay-free", "implied", "--period", "4", *EPSILON, "--bandwidth", "0.1"], "bandwidth of the anti-windup"),
         (["extended", "implied", "--reference-omega", "1.5", "--a", "4", "--e", "-2", "--f", "1"], "unstable"),
         (
             [
@@ -126,12 +127,12 @@ def test_design_refuses_bad_numbers(runner: CliRunner, tmp_path: Path, arguments
 
 def test_design_refuses_a_missing_folder(runner: CliRunner, tmp_path: Path) -> None:
     output = tmp_path / "nowhere" / "design.json"
-    result = runner.invoke(design_main, ["delay-free", "implied", "--period", "4", "--output", str(output)])
+    result = runner.invoke(design_main, ["delay-free", "implied", "--period", "4", *EPSILON, "--output", str(output)])
     refused(result, "cannot be written")
 
 
 APPENDIX = ["trade-off", "interpolation", "robustness", "limits", "sampled-rates"]
-SIMULATE = ["--limit", "12", "--anti-windup", "thesis", "--until", "1", "--sample-time", "0.01"]
+SIMULATE = ["--limit", "12", "--anti-windup", "thesis", "--until", "1", "--sample-time", "0.01", "--amplitude", "50"]
 
 
 def test_simulate_writes_what_it_promises(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
@@ -229,13 +230,14 @@ def test_experiments_refuse_a_missing_design(runner: CliRunner, tmp_path: Path, 
     options = (
         [*SIMULATE, "--output", str(tmp_path / "run.csv")] if command == "simulate" else ["--output", str(tmp_path)]
     )
-    result = runner.invoke(experiments_main, [command, str(tmp_path / "none.json"), *options])
+    group = [] if command == "simulate" else ["thesis"]
+    result = runner.invoke(experiments_main, [*group, command, str(tmp_path / "none.json"), *options])
     refused(result, "none.json", "no such file")
     assert not list(tmp_path.iterdir())
 
 
 def test_experiments_refuse_the_other_kind(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
-    result = runner.invoke(experiments_main, ["delay-free", str(extended_json), "--output", str(tmp_path)])
+    result = runner.invoke(experiments_main, ["thesis", "delay-free", str(extended_json), "--output", str(tmp_path)])
     refused(result, "kind is 'extended'", "expected 'delay-free'")
 
 
@@ -243,7 +245,7 @@ def test_experiments_refuse_a_missing_block(runner: CliRunner, tmp_path: Path, e
     content = json.loads(extended_json.read_text(encoding="utf-8"))
     del content["blocks"]["T_so"]
     extended_json.write_text(json.dumps(content), encoding="utf-8")
-    result = runner.invoke(experiments_main, ["extended", str(extended_json), "--output", str(tmp_path)])
+    result = runner.invoke(experiments_main, ["thesis", "extended", str(extended_json), "--output", str(tmp_path)])
     refused(result, "extended.json", "'T_so' is missing")
 
 
@@ -262,7 +264,7 @@ def test_additive_error_refuses_bad_sweeps(runner: CliRunner, tmp_path: Path, te
     sweep.write_text(text, encoding="utf-8")
     output.mkdir()
     refused(
-        runner.invoke(experiments_main, ["additive-error", "implied", str(sweep), "--output", str(output)]),
+        runner.invoke(experiments_main, ["thesis", "additive-error", "implied", str(sweep), "--output", str(output)]),
         "sweep.csv",
         *parts,
     )
@@ -293,7 +295,7 @@ def test_outputs_are_files_and_links_are_followed(runner: CliRunner, tmp_path: P
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (["delay-free", "implied", "--period", "1e-300"], ""),
+        (["delay-free", "implied", "--period", "1e-300", *EPSILON], ""),
         (["extended", "implied", "--reference-omega", "1.5", "--a", "1e300", "--e", "2", "--f", "1"], ""),
     ],
 )
@@ -319,6 +321,6 @@ def test_a_run_of_too_many_steps_or_rows_is_refused(runner: CliRunner, tmp_path:
 
 
 def test_additive_error_refuses_a_missing_sweep(runner: CliRunner, tmp_path: Path) -> None:
-    arguments = ["additive-error", "implied", str(tmp_path / "none.csv"), "--output", str(tmp_path)]
+    arguments = ["thesis", "additive-error", "implied", str(tmp_path / "none.csv"), "--output", str(tmp_path)]
     refused(runner.invoke(experiments_main, arguments), "none.csv")
     assert not list(tmp_path.iterdir())

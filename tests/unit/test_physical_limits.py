@@ -21,6 +21,8 @@ from experiments.physical_limits.intervals import Interval
 from experiments.physical_limits.least_peak_error import RestLimit, limits_tables, periodic_limit
 from experiments.physical_limits.peak_program import PeakProgram
 from experiments.runs.references import Reference, sinusoid
+from experiments.thesis.printed_choices import thesis_reference
+from experiments.thesis.studies.conditions import several_limits
 from identification.base.errors import InputError
 from identification.model.plant import Mode, PlantModel
 
@@ -260,7 +262,7 @@ def tables(extended_design: Design) -> dict[str, pd.DataFrame]:
     patch = pytest.MonkeyPatch()
     for name, value in {"STEPS": 60, "FEWER_STEPS": 60, "STARTS": 6, "RUN_PERIODS": 6}.items():
         patch.setattr(least_peak_error, name, value)
-    found = limits_tables(extended_design, [12.5, 9.5])
+    found = limits_tables(extended_design, thesis_reference("extended", (1.5,)), [12.5, 9.5])
     patch.undo()
     return found
 
@@ -296,7 +298,8 @@ def test_usual_limits(delay_free_design: Design, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(RestLimit, "at", lambda *_: Interval(1.0, 2.0))
     monkeypatch.setattr(RestLimit, "_known", lambda *_: Interval(1.0, 2.0))
     monkeypatch.setattr(least_peak_error, "HORIZON", 1)
-    found = limits_tables(delay_free_design)
+    reference = thesis_reference("delay-free", delay_free_design.reference_omegas)
+    found = limits_tables(delay_free_design, reference, several_limits(delay_free_design))
     required = found["limits_delay_free"]["required"][0]
     shares = found["limits_delay_free"]["limit"] / required
     assert shares.tolist() == pytest.approx([0.8, 0.9, 10.0 / required, 0.95, 0.98, 1.05, 1.2, 1.5])
@@ -307,18 +310,21 @@ def test_usual_limits(delay_free_design: Design, monkeypatch: pytest.MonkeyPatch
 def test_command_line(extended_design: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
-    def found(design: Design, limits: tuple[float, ...] | None, tick: object) -> dict[str, pd.DataFrame]:
-        asked.append((design.kind, limits))
+    def found(design: Design, reference: Reference, limits: Sequence[float], tick: object) -> dict[str, pd.DataFrame]:
+        asked.append((design.kind, reference, limits))
         return {"limits_extended": pd.DataFrame({"limit": [2.0]}), "limits_extended_summary": pd.DataFrame({"a": [1]})}
 
     monkeypatch.setattr("experiments.physical_limits.least_peak_error.limits_tables", found)
     path = tmp_path / "design.json"
     path.write_text(extended_design.to_json(), encoding="utf-8")
-    command = ["limits", str(path), "--output", str(tmp_path)]
-    for given in ([], ["--limit", "9", "--limit", "12.5"]):
-        result = CliRunner().invoke(main, [*command, *given])
+    own = ["limits", "--limit", "9", "--limit", "12.5", "--amplitude", "7", "--offset", "2"]
+    for given in (["thesis", "limits"], own):
+        result = CliRunner().invoke(main, [*given, str(path), "--output", str(tmp_path)])
         assert (result.exit_code, result.output) == (0, "")
-    assert asked == [("extended", None), ("extended", (9.0, 12.5))]
+    assert asked == [
+        ("extended", thesis_reference("extended", (1.5,)), several_limits(extended_design)),
+        ("extended", Reference((7.0,), (1.5,), (0.0,), 2.0), (9.0, 12.5)),
+    ]
     assert sorted(file.name for file in tmp_path.glob("*.csv")) == [
         "limits_extended.csv",
         "limits_extended_summary.csv",
@@ -330,7 +336,7 @@ def test_command_line_refuses_limits(extended_design: Design, tmp_path: Path, li
     path = tmp_path / "design.json"
     path.write_text(extended_design.to_json(), encoding="utf-8")
     result = CliRunner().invoke(
-        main, ["limits", str(path), "--limit", "9", "--limit", limit, "--output", str(tmp_path)]
+        main, ["limits", str(path), "--limit", "9", "--limit", limit, "--amplitude", "50", "--output", str(tmp_path)]
     )
     assert result.exit_code == 2
     assert result.stderr == f"Error: the limit is {limit}; expected a positive finite number\n"

@@ -36,6 +36,8 @@ def reference_csv(tmp_path: Path) -> Path:
 
 def invoke(command: str, design: Path, *arguments: str) -> Result:
     output = design.parent / "run.csv"
+    if not {"--amplitude", "--reference"} & set(arguments):
+        arguments = (*arguments, "--amplitude", "50")
     return CliRunner().invoke(main, [command, str(design), *COMMANDS[command], *arguments, "--output", str(output)])
 
 
@@ -152,7 +154,7 @@ def test_sampled_refuses_a_missing_design(tmp_path: Path) -> None:
 def test_sampled_rates_is_for_the_extended_design(delay_free_design: Design, tmp_path: Path) -> None:
     path = tmp_path / "delay_free.json"
     path.write_text(delay_free_design.to_json(), encoding="utf-8")
-    result = CliRunner().invoke(main, ["sampled-rates", str(path), "--output", str(tmp_path)])
+    result = CliRunner().invoke(main, ["thesis", "sampled-rates", str(path), "--output", str(tmp_path)])
     assert result.exit_code == 2
     assert "kind is 'delay-free'; expected 'extended'" in result.stderr
     assert [file.name for file in tmp_path.iterdir()] == ["delay_free.json"]

@@ -281,7 +281,8 @@ def limit_cycle() -> Design:
 
 def said(command: str, design: Design, folder: Path, *arguments: str) -> str:
     (folder / "design.json").write_text(design.to_json(), encoding="utf-8")
-    options = ["--until", "5", *arguments, "--output", str(folder / "run.csv")]
+    reference = () if "--amplitude" in arguments else ("--amplitude", "50", "--phase", str(math.pi / 2))
+    options = ["--until", "5", *arguments, *reference, "--output", str(folder / "run.csv")]
     result = CliRunner().invoke(main, [command, str(folder / "design.json"), *options])
     assert result.exit_code == 0, result.output
     return result.stdout

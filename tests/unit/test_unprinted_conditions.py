@@ -322,7 +322,7 @@ def test_the_command_writes_both_tables(
     monkeypatch.setattr(search, "every_condition", lambda: [implied_exact])
     monkeypatch.setattr(chapter_2_weights, "usual_limits", lambda: np.array([0.95, 0.99, 1.05]))
     monkeypatch.setattr(chapter_2_weights, "usual_weights", lambda: (Weights(),))
-    result = CliRunner().invoke(main, ["conditions", "--output", str(tmp_path)])
+    result = CliRunner().invoke(main, ["thesis", "conditions", "--output", str(tmp_path)])
     assert result.exit_code == 0, result.output
     table, summary = (pd.read_csv(tmp_path / f"{name}.csv") for name in ("conditions", "conditions_summary"))
     assert set(table["case"]) == {"extended", "delay_free"}
@@ -333,7 +333,7 @@ def test_the_command_writes_both_tables(
 
 
 def test_the_command_refuses_a_missing_folder(tmp_path: Path) -> None:
-    result = CliRunner().invoke(main, ["conditions", "--output", str(tmp_path / "none")])
+    result = CliRunner().invoke(main, ["thesis", "conditions", "--output", str(tmp_path / "none")])
     assert result.exit_code == 2
     assert "no such folder" in result.stderr
 

@@ -210,7 +210,9 @@ def _ledger(text: str, path: Path) -> pd.DataFrame:
         raise InputError(f"{path}: not a table of comma-separated values") from None
     lacking = [column for column in LEDGER if column not in ledger.columns]
     if lacking:
-        raise InputError(f"{path}: no column {', '.join(lacking)}; expected what 'python -m experiments thesis claims' writes")
+        raise InputError(
+            f"{path}: no column {', '.join(lacking)}; expected what 'python -m experiments thesis claims' writes"
+        )
     if ledger.empty:
         raise InputError(f"{path}: no rows below the names of the columns")
     for column in ("computed", "tolerance"):
