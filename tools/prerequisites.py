@@ -1,6 +1,7 @@
 """The imports of the rooms -> build/prerequisites.mk, a make variable for each command with the files that it runs.
 
-    CODE-ROOM-COMMAND    what `python -m ROOM COMMAND` imports (CODE-thesis-COMMAND: `python -m experiments thesis COMMAND`)
+    CODE-ROOM-COMMAND    what `python -m ROOM COMMAND` imports
+    CODE-thesis-COMMAND  what `python -m experiments thesis COMMAND` imports
     CODE-FIGURE          what the module of a figure imports
     CODE-checks          what the functions that the ledger names import
 

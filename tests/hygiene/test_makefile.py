@@ -80,7 +80,9 @@ def test_the_report_draws_every_figure_and_judges_the_ledger_first(build: Path) 
     result = make("-n", "MODEL=implied", f"BUILD={build}", "report")
     assert result.returncode == 0, result.stderr
     steps = result.stdout
-    assert all(f"draw {path.stem} " in steps for path in (ROOT / "paper_figures").glob("fig_*.py"))
-    assert "experiments claims" in steps
+    assert all(
+        f"draw {path.stem} " in steps for path in (ROOT / "paper_figures" / "thesis" / "figures").glob("fig_*.py")
+    )
+    assert "experiments thesis claims" in steps
     assert "paper_figures report implied data/elevation/" in steps.splitlines()[-1]
     assert not build.exists()

@@ -15,7 +15,8 @@ Make = Callable[..., subprocess.CompletedProcess[str]]
 # Writes what the command of the same words would; refuses, or crashes, if a file of that name lies beside it.
 STAND_IN = r"""#!/bin/bash
 here=$(dirname "$0")
-room=$2 command=$3 output=${!#}
+room=$2 command=$3 design=$4 output=${!#}
+[ "$command" != thesis ] || { command=$4 design=$5; }
 [ "$room" != paper_figures ] || [ "$command" != draw ] || command=$4
 if [ -e "$here/$command.refuses" ]; then echo "Error: $command will not" >&2; exit 2; fi
 if [ -e "$here/$command.crashes" ]; then echo "Traceback of $command" >&2; exit 1; fi
@@ -26,7 +27,7 @@ experiments)
     [ $command != campaign ] || { touch "$output"; exit; }
     name=${command//-/_}
     [ $command != campaign-tables ] || { name=campaign; touch "$output/campaign_distance.csv"; }
-    [ $command != limits ] || name=limits_$(basename "$4" .json | sed s/design_//)
+    [ $command != limits ] || name=limits_$(basename "$design" .json | sed s/design_//)
     [ $command != sampled-rates ] || name=sampled
     [ $command != interpolation ] || touch "$output/interpolation_map.csv"
     touch "$output/$name.csv" "$output/${name}_summary.csv" ;;

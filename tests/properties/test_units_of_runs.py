@@ -6,6 +6,7 @@ round differently, and the limits of what the engine claims hold: 1e-11 of the l
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
