@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike
 from identification.base.arrays import Complex
 from identification.base.errors import InputError
 
+HIGHEST_ORDER = 8
+"""Most poles of an additive bound that is fitted."""
+
 
 def _finite(**numbers: float) -> None:
     for name, number in numbers.items():
