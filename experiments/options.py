@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,14 +19,13 @@ OUTPUT_FOLDER = click.option(
 )
 _SINUSOIDS = (
     click.option("--amplitude", type=float, multiple=True, help="Of the reference; once a frequency of DESIGN."),
-    click.option("--phase", type=float, multiple=True, help="In radians; once a frequency, 0 unless given."),
-    click.option("--offset", type=float, default=0.0, help="Of the reference, 0 unless given."),
+    click.option("--phase", type=float, multiple=True, help="In radians; once a frequency; 0 unless given."),
+    click.option("--offset", type=float, help="Of the reference, 0 unless given."),
 )
 _OTHERS = (
     click.option(
         "--slope",
         type=float,
-        default=0.0,
         help="Of a ramp added to the reference, a second; --amplitude 0 leaves it alone.",
     ),
     click.option(
@@ -51,7 +51,11 @@ def reference_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def sinusoids(
-    design: Design, amplitude: tuple[float, ...], phase: tuple[float, ...], offset: float, slope: float = 0.0
+    design: Design,
+    amplitude: tuple[float, ...],
+    phase: tuple[float, ...],
+    offset: float | None,
+    slope: float | None = None,
 ) -> Reference:
     """The reference at the frequencies of a design.
 
@@ -60,9 +64,10 @@ def sinusoids(
     design
         Has the frequencies.
     amplitude, phase
-        One for each frequency, in the plant's output unit and in radians; no phases are phases of 0.
+        One for each frequency, in the plant's output unit and in radians; no phases are
+        phases of 0, and pi/2 at omega = 0, so that the constant is the amplitude.
     offset, slope
-        In the plant's output unit, and in that unit per second.
+        In the plant's output unit, and in that unit per second; None is 0.
 
     Raises
     ------
@@ -73,15 +78,16 @@ def sinusoids(
     if not amplitude:
         said = ", ".join(f"{omega:g}" for omega in omegas)
         raise InputError(f"no --amplitude is given; expected one for each frequency of the design, {said} rad/s")
-    return Reference(amplitude, omegas, phase or (0.0,) * len(omegas), offset, slope)
+    usual = tuple(0.0 if omega else math.pi / 2 for omega in omegas)
+    return Reference(amplitude, omegas, phase or usual, offset or 0.0, slope or 0.0)
 
 
 def reference_of(
     design: Design,
     amplitude: tuple[float, ...],
     phase: tuple[float, ...],
-    offset: float,
-    slope: float,
+    offset: float | None,
+    slope: float | None,
     reference: Path | None,
 ) -> Reference | SampledReference:
     """The reference of sinusoids, see :func:`sinusoids`, or the one of a file.
@@ -95,7 +101,7 @@ def reference_of(
     if reference is None:
         return sinusoids(design, amplitude, phase, offset, slope)
     for name, value in {"amplitude": amplitude, "phase": phase, "offset": offset, "slope": slope}.items():
-        if value:
+        if value not in ((), None):
             raise InputError(f"--{name} belongs to a reference of sinusoids; found --reference {reference} too")
     return read_reference(reference)
 
