@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from design.design_file import Design
@@ -11,7 +12,11 @@ from identification.base.errors import InputError
 
 
 def sinusoids(
-    design: Design, amplitude: tuple[float, ...], phase: tuple[float, ...], offset: float, slope: float = 0.0
+    design: Design,
+    amplitude: tuple[float, ...],
+    phase: tuple[float, ...],
+    offset: float | None,
+    slope: float | None = None,
 ) -> Reference:
     """The reference at the frequencies of a design.
 
@@ -20,9 +25,10 @@ def sinusoids(
     design
         Has the frequencies.
     amplitude, phase
-        One for each frequency, in the plant's output unit and in radians; no phases are phases of 0.
+        One for each frequency, in the plant's output unit and in radians; no phases are
+        phases of 0, and pi/2 at omega = 0, so that the constant is the amplitude.
     offset, slope
-        In the plant's output unit, and in that unit per second.
+        In the plant's output unit, and in that unit per second; None is 0.
 
     Raises
     ------
@@ -33,15 +39,16 @@ def sinusoids(
     if not amplitude:
         said = ", ".join(f"{omega:g}" for omega in omegas)
         raise InputError(f"no --amplitude is given; expected one for each frequency of the design, {said} rad/s")
-    return Reference(amplitude, omegas, phase or (0.0,) * len(omegas), offset, slope)
+    usual = tuple(0.0 if omega else math.pi / 2 for omega in omegas)
+    return Reference(amplitude, omegas, phase or usual, offset or 0.0, slope or 0.0)
 
 
 def reference_of(
     design: Design,
     amplitude: tuple[float, ...],
     phase: tuple[float, ...],
-    offset: float,
-    slope: float,
+    offset: float | None,
+    slope: float | None,
     reference: Path | None,
 ) -> Reference | SampledReference:
     """The reference of sinusoids, see :func:`sinusoids`, or the one of a file.
@@ -55,6 +62,6 @@ def reference_of(
     if reference is None:
         return sinusoids(design, amplitude, phase, offset, slope)
     for name, value in {"amplitude": amplitude, "phase": phase, "offset": offset, "slope": slope}.items():
-        if value:
+        if value not in ((), None):
             raise InputError(f"--{name} belongs to a reference of sinusoids; found --reference {reference} too")
     return read_reference(reference)

@@ -15,14 +15,13 @@ OUTPUT_FOLDER = click.option(
 )
 _SINUSOIDS = (
     click.option("--amplitude", type=float, multiple=True, help="Of the reference; once a frequency of DESIGN."),
-    click.option("--phase", type=float, multiple=True, help="In radians; once a frequency, 0 unless given."),
-    click.option("--offset", type=float, default=0.0, help="Of the reference, 0 unless given."),
+    click.option("--phase", type=float, multiple=True, help="In radians; once a frequency; 0 unless given."),
+    click.option("--offset", type=float, help="Of the reference, 0 unless given."),
 )
 _OTHERS = (
     click.option(
         "--slope",
         type=float,
-        default=0.0,
         help="Of a ramp added to the reference, a second; --amplitude 0 leaves it alone.",
     ),
     click.option(
