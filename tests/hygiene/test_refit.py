@@ -26,7 +26,7 @@ command=$1 output=${!#}
     done
 }
 for input; do
-    [ -z "$refusal" ] || [ "$input" = "$output" ] || [ -e "$input" ] || [[ $input != *.json && $input != *.parquet ]] || exit 0
+    case $input in "$output") ;; *.json | *.parquet) [ -z "$refusal" ] || [ -e "$input" ] || exit 0 ;; esac
 done
 if [ -e "$here/$command.refuses" ]; then
     echo "Error: $command will not" >&2
@@ -59,8 +59,15 @@ def make(tmp_path: Path) -> Make:
     python.write_text(STAND_IN, encoding="utf-8")
     python.chmod(0o755)
     own = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
-    (tmp_path / "a.csv").touch()
-    common = ["make", f"PY={python}", "READY=Makefile", f"OUT={tmp_path / 'mine'}", f"SWEEPS={tmp_path / 'a.csv'}"]
+    for name in ("a.csv", "ready"):
+        (tmp_path / name).touch()
+    common = [
+        "make",
+        f"PY={python}",
+        f"READY={tmp_path / 'ready'}",
+        f"OUT={tmp_path / 'mine'}",
+        f"SWEEPS={tmp_path / 'a.csv'}",
+    ]
 
     def run(*arguments: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run([*common, *arguments], cwd=ROOT, env=own, capture_output=True, text=True, check=False)
