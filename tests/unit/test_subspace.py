@@ -113,7 +113,7 @@ def test_no_answer_is_said_and_nothing_leaks(
         np.log(np.zeros(1))
         raise failure
 
-    monkeypatch.setattr(subspace_check.sippy_unipi, "system_identification", fails)
+    monkeypatch.setattr("sippy_unipi.system_identification", fails)
     plant = PLANTS["no integrator, real pole"]
     check = check_modes(plant, _record(plant), BAND)
     assert check.modes == ()
