@@ -11,7 +11,6 @@ import numpy as np
 
 from identification.base.errors import InputError
 
-
 EXTRAS = {"dask": "campaign", "distributed": "campaign", "pyarrow": "campaign"}  # of pyproject.toml, by their modules
 
 

@@ -11,7 +11,6 @@ import pytest
 from held_plant import PLANTS, held_response
 
 from data.thesis import model_named
-from identification.fitting import subspace_check
 from identification.fitting.subspace_check import SubspaceCheck, check_modes
 from identification.model.plant import Mode, PlantModel
 from identification.sweeps.read_sweeps import read_sweeps
