@@ -1,4 +1,7 @@
-"""The command line of this room: python -m identification fit SWEEP... --output model.json."""
+"""The command line of this room: python -m identification fit SWEEP... --output model.json.
+
+The command imports what it runs, so that a command line answers at once.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import click
-import matplotlib.style
-from tqdm import tqdm
 
 from identification.base.command_line import CommandGroup
 from identification.base.errors import InputError
 from identification.base.files import write_whole
-from identification.bound.bound_residuals import HIGHEST_ORDER, bound_residuals
-from identification.fitting.fit_plant import fit_plant
-from identification.fitting.subspace_check import SubspaceCheck, check_modes
-from identification.model.model_file import IdentifiedModel
-from identification.model.plant import PlantModel
-from identification.model.structure import Wanted
-from identification.output.fit_facts import bound_remarks, bound_text, check_lines, facts, standard_errors, table
-from identification.output.plots import draw_fit
-from identification.sweeps.read_sweeps import input_files, read_sweeps
-from identification.sweeps.response import FrequencyResponse, alias_free
+from identification.model.plant import HIGHEST_ORDER
 
 FIGURES = (".pdf", ".svg", ".png")
 
@@ -92,6 +84,19 @@ def fit(
     figure: Path | None,
 ) -> None:
     """Fit gain, integrators, modes, real roots and dead time to SWEEP files (raw records or frequency responses)."""
+    import matplotlib.style
+    from tqdm import tqdm
+
+    from identification.bound.bound_residuals import bound_residuals
+    from identification.fitting.fit_plant import fit_plant
+    from identification.fitting.subspace_check import check_modes
+    from identification.model.model_file import IdentifiedModel
+    from identification.model.structure import Wanted
+    from identification.output.fit_facts import bound_remarks, bound_text, check_lines, facts, standard_errors, table
+    from identification.output.plots import draw_fit
+    from identification.sweeps.read_sweeps import input_files, read_sweeps
+    from identification.sweeps.response import alias_free
+
     if figure is not None and figure.suffix not in FIGURES:
         raise InputError(f"{figure}: the suffix is '{figure.suffix}'; expected {', '.join(FIGURES)}")
     if figure == output:
@@ -100,7 +105,11 @@ def fit(
     with tqdm(desc="fits", unit="", disable=None, leave=False) as bar:
         wanted = Wanted(None if integrators == "auto" else int(integrators), modes, real)
         result = fit_plant(tests, wanted, soft=loss == "soft-l1", seed=seed, tick=bar.update)
-        checks = _checks(tests, [test.plant for test in result.tests], bar.update)
+        checks = {}
+        for test, own in zip(tests, result.tests, strict=True):
+            if test.record is not None:
+                checks[test.name] = check_modes(own.plant, test.record, (float(test.omega[0]), float(test.omega[-1])))
+                bar.update()
     clean = [alias_free(test, result.plant) for test in tests]
     report = bound_residuals(result.plant, clean, [test.plant for test in result.tests], bound_order)
     model = IdentifiedModel(result.plant, report.bound, standard_errors(result), facts(tests, result, report, checks))
@@ -113,18 +122,6 @@ def fit(
             writers[figure] = lambda path: drawing.savefig(path, dpi=300, metadata=dateless)
         write_whole(writers, inputs=input_files(sweeps))
     click.echo("\n".join([table(result), bound_text(report.bound), *bound_remarks(report), *check_lines(checks)]))
-
-
-def _checks(
-    tests: list[FrequencyResponse], plants: list[PlantModel], tick: Callable[[], object]
-) -> dict[str, SubspaceCheck]:
-    """By its name, the subspace check of each test that was read from a raw record against its own fit."""
-    checks = {}
-    for test, plant in zip(tests, plants, strict=True):
-        if test.record is not None:
-            checks[test.name] = check_modes(plant, test.record, (float(test.omega[0]), float(test.omega[-1])))
-            tick()
-    return checks
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from experiments.engine import integrator
 from experiments.engine.compiled_loop import BRIEF, CompiledLoop, compile_loop
 from experiments.engine.saturated_loop import SaturatedLoop
 from identification.base.errors import InputError
+
+if TYPE_CHECKING:
+    from control import TimeResponseData
 
 MOST_STEPS = 2e7  # a few minutes
 MOST_ROOM = 1e8  # numbers, a gigabyte
@@ -41,6 +45,19 @@ class Run:
     outputs: Mapping[str, np.ndarray]
     events_s: np.ndarray
     modes: np.ndarray
+
+    def to_control(self) -> TimeResponseData:
+        """The run as python-control's time response: the outputs by their names, and the input sat(u)."""
+        from control import TimeResponseData
+
+        return TimeResponseData(
+            self.time_s,
+            np.array(list(self.outputs.values())),
+            inputs=self.saturated_control,
+            output_labels=list(self.outputs),
+            input_labels=["saturated_control"],
+            issiso=False,
+        )
 
 
 class DivergenceError(InputError):
