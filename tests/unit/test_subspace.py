@@ -120,6 +120,13 @@ def test_no_answer_is_said_and_nothing_leaks(
     assert capfd.readouterr() == ("", "")
 
 
+def test_without_its_package_the_check_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("identification.fitting.subspace_check.find_spec", lambda name: None)
+    plant = PLANTS["no integrator, real pole"]
+    said = str(check_modes(plant, _record(plant), BAND))
+    assert said.endswith('no answer (sippy-unipi is missing; pip install "antiwindup-thesis[check]")')
+
+
 def test_records_that_give_no_answer() -> None:
     plant = PLANTS["no integrator, real pole"]
     record = _record(plant)
