@@ -1,9 +1,24 @@
-"""Designs -> saturated closed loops with an exact dead time -> the tables behind every figure."""
+"""Designs -> saturated closed loops with an exact dead time -> runs, and the tables behind every figure.
+
+>>> import design, experiments, identification
+>>> plant = identification.PlantModel(7.0, (), (identification.Mode(300.0, 0.02),), delay_s=0.01)
+>>> bound = identification.AdditiveBound.printed_form(gain=0.01, corner=100.0, omega=300.0, zeta=0.1)
+>>> model = identification.IdentifiedModel(plant, bound)
+>>> own = design.extended(model, reference_omegas=[1.5], a=4.0, pairs=[(2.0, 1.0)])
+>>> reference = experiments.sinusoid(amplitude=50.0, omega=1.5, phase_rad=0.0, offset=0.0)
+>>> run = experiments.simulate(own, limits=12.0, reference=reference, anti_windup="corrected")
+>>> bool(abs(run.saturated_control).max() <= 12.0)
+True
+"""
 
 import hashlib
 import os
 import sys
 from pathlib import Path
+
+from identification.base.faces import face
+
+__getattr__, __dir__, __all__ = face(__name__, __file__)
 
 # numba looks only at the module of a compiled function for changes, not at those that it calls into: a cache for each
 # state of them all, unless the user has one; in the user's cache folder where the package may not be written to

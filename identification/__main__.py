@@ -87,15 +87,11 @@ def fit(
     import matplotlib.style
     from tqdm import tqdm
 
-    from identification.bound.bound_residuals import bound_residuals
-    from identification.fitting.fit_plant import fit_plant
-    from identification.fitting.subspace_check import check_modes
-    from identification.model.model_file import IdentifiedModel
+    from identification.fit_model import fit_model
     from identification.model.structure import Wanted
-    from identification.output.fit_facts import bound_remarks, bound_text, check_lines, facts, standard_errors, table
+    from identification.output.fit_facts import bound_remarks, bound_text, check_lines, table
     from identification.output.plots import draw_fit
     from identification.sweeps.read_sweeps import input_files, read_sweeps
-    from identification.sweeps.response import alias_free
 
     if figure is not None and figure.suffix not in FIGURES:
         raise InputError(f"{figure}: the suffix is '{figure.suffix}'; expected {', '.join(FIGURES)}")
@@ -104,24 +100,18 @@ def fit(
     tests = read_sweeps(sweeps)
     with tqdm(desc="fits", unit="", disable=None, leave=False) as bar:
         wanted = Wanted(None if integrators == "auto" else int(integrators), modes, real)
-        result = fit_plant(tests, wanted, soft=loss == "soft-l1", seed=seed, tick=bar.update)
-        checks = {}
-        for test, own in zip(tests, result.tests, strict=True):
-            if test.record is not None:
-                checks[test.name] = check_modes(own.plant, test.record, (float(test.omega[0]), float(test.omega[-1])))
-                bar.update()
-    clean = [alias_free(test, result.plant) for test in tests]
-    report = bound_residuals(result.plant, clean, [test.plant for test in result.tests], bound_order)
-    model = IdentifiedModel(result.plant, report.bound, standard_errors(result), facts(tests, result, report, checks))
-    text = model.to_json()
+        soft = loss == "soft-l1"
+        fitted = fit_model(tests, wanted, soft=soft, bound_order=bound_order, seed=seed, tick=bar.update)
+    text = fitted.model.to_json()
     writers: dict[Path, Callable[[Path], object]] = {output: lambda path: path.write_text(text, encoding="utf-8")}
     with matplotlib.style.context(["default", {"svg.hashsalt": "identification", "font.size": 9}]):
         if figure is not None:
-            drawing = draw_fit(clean, result.plant, report.bound)
+            drawing = draw_fit(fitted.tests, fitted.model.plant, fitted.model.additive_bound)
             dateless = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}, ".png": {}}[figure.suffix]
             writers[figure] = lambda path: drawing.savefig(path, dpi=300, metadata=dateless)
         write_whole(writers, inputs=input_files(sweeps))
-    click.echo("\n".join([table(result), bound_text(report.bound), *bound_remarks(report), *check_lines(checks)]))
+    bound = [bound_text(fitted.model.additive_bound), *bound_remarks(fitted.bound_fit)]
+    click.echo("\n".join([table(fitted.plant_fit), *bound, *check_lines(fitted.checks)]))
 
 
 if __name__ == "__main__":
