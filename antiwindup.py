@@ -10,7 +10,7 @@ ROOMS = ("identification", "design", "experiments", "paper_figures")
 
 
 class Rooms(click.Group):
-    """The groups of the rooms, each under its room's name and with its room's docstring."""
+    """The groups of the rooms, each under its room's name and with the first line of its room's docstring."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(ROOMS)
@@ -23,7 +23,7 @@ class Rooms(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
-            formatter.write_dl([(room, str(import_module(room).__doc__)) for room in ROOMS])
+            formatter.write_dl([(room, str(import_module(room).__doc__).splitlines()[0]) for room in ROOMS])
 
 
 @click.group(cls=Rooms)

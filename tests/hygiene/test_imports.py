@@ -72,6 +72,15 @@ def test_a_new_wing_must_be_given_its_place(tree: Path) -> None:
     assert broken(tree) == ["wings of design"]
 
 
+@pytest.mark.parametrize("room", ["identification", "design", "experiments", "paper_figures"])
+def test_a_face_shows_its_own_room_without_the_thesis(room: str) -> None:
+    """The package imports what its stub names, which the contracts do not see."""
+    stub = (ROOT / room / "__init__.pyi").read_text(encoding="utf-8")
+    homes = re.findall(r"^from (\S+) import", stub, flags=re.MULTILINE)
+    assert homes
+    assert all(home.startswith(f"{room}.") and ".thesis" not in home for home in homes)
+
+
 @pytest.mark.parametrize("path", [*sorted((ROOT / "data").glob("*.py")), ROOT / "antiwindup.py"], ids=lambda p: p.name)
 def test_what_stands_beside_the_rooms_imports_none(path: Path) -> None:
     """The data are made without the tool, and the console command imports a room only when it is asked for."""

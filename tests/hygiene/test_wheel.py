@@ -1,4 +1,4 @@
-"""The wheel, installed without network into an environment of its own, works from any folder; what is missing is said."""
+"""The wheel, installed without network in an environment of its own, works from any folder; what is missing is said."""
 
 from __future__ import annotations
 
