@@ -2,6 +2,8 @@
 
 >>> import identification
 >>> tests = identification.read_sweeps(["data/elevation/synthetic_test_1_frf.csv"])
+>>> tests
+[FrequencyResponse('synthetic_test_1_frf.csv', 1216 lines, 10.06 to 199.9 Hz, synthetic)]
 >>> model = identification.fit(tests, modes=2, integrators=1)
 >>> model.plant.relative_degree
 1

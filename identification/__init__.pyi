@@ -1,10 +1,19 @@
-from identification.base.errors import InputError as InputError
-from identification.fit_model import fit as fit
-from identification.model.model_file import IdentifiedModel as IdentifiedModel
-from identification.model.model_file import read_model as read_model
-from identification.model.plant import AdditiveBound as AdditiveBound
-from identification.model.plant import Mode as Mode
-from identification.model.plant import PlantModel as PlantModel
-from identification.sweeps.read_sweeps import read_sweeps as read_sweeps
-from identification.sweeps.response import FrequencyResponse as FrequencyResponse
-from identification.sweeps.response import alias_free as alias_free
+from identification.base.errors import InputError
+from identification.fit_model import fit
+from identification.model.model_file import IdentifiedModel, read_model
+from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.sweeps.read_sweeps import read_sweeps
+from identification.sweeps.response import FrequencyResponse, alias_free
+
+__all__ = [
+    "AdditiveBound",
+    "FrequencyResponse",
+    "IdentifiedModel",
+    "InputError",
+    "Mode",
+    "PlantModel",
+    "alias_free",
+    "fit",
+    "read_model",
+    "read_sweeps",
+]

@@ -5,17 +5,13 @@ The command imports what it runs, so that a command line answers at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import click
 
 from identification.base.command_line import CommandGroup
-from identification.base.errors import InputError
 from identification.base.files import write_whole
 from identification.model.plant import HIGHEST_ORDER
-
-FIGURES = (".pdf", ".svg", ".png")
 
 
 class Counts(click.ParamType):
@@ -71,7 +67,6 @@ def main() -> None:
     help="Of W_a; 2 is Eq. (2.22).",
 )
 @click.option("--seed", default=0, type=click.IntRange(min=0), show_default=True, help="Of the random restarts.")
-@click.option("--figure", type=click.Path(path_type=Path), help="Draw the fit; .pdf, .svg or .png.")
 def fit(
     sweeps: tuple[Path, ...],
     output: Path,
@@ -81,35 +76,22 @@ def fit(
     loss: str,
     bound_order: int,
     seed: int,
-    figure: Path | None,
 ) -> None:
     """Fit gain, integrators, modes, real roots and dead time to SWEEP files (raw records or frequency responses)."""
-    import matplotlib.style
     from tqdm import tqdm
 
     from identification.fit_model import fit_model
     from identification.model.structure import Wanted
     from identification.output.fit_facts import bound_remarks, bound_text, check_lines, table
-    from identification.output.plots import draw_fit
     from identification.sweeps.read_sweeps import input_files, read_sweeps
 
-    if figure is not None and figure.suffix not in FIGURES:
-        raise InputError(f"{figure}: the suffix is '{figure.suffix}'; expected {', '.join(FIGURES)}")
-    if figure == output:
-        raise InputError(f"{figure}: given as --output and as --figure; expected two files")
     tests = read_sweeps(sweeps)
     with tqdm(desc="fits", unit="", disable=None, leave=False) as bar:
         wanted = Wanted(None if integrators == "auto" else int(integrators), modes, real)
         soft = loss == "soft-l1"
         fitted = fit_model(tests, wanted, soft=soft, bound_order=bound_order, seed=seed, tick=bar.update)
     text = fitted.model.to_json()
-    writers: dict[Path, Callable[[Path], object]] = {output: lambda path: path.write_text(text, encoding="utf-8")}
-    with matplotlib.style.context(["default", {"svg.hashsalt": "identification", "font.size": 9}]):
-        if figure is not None:
-            drawing = draw_fit(fitted.tests, fitted.model.plant, fitted.model.additive_bound)
-            dateless = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}, ".png": {}}[figure.suffix]
-            writers[figure] = lambda path: drawing.savefig(path, dpi=300, metadata=dateless)
-        write_whole(writers, inputs=input_files(sweeps))
+    write_whole({output: lambda path: path.write_text(text, encoding="utf-8")}, inputs=input_files(sweeps))
     bound = [bound_text(fitted.model.additive_bound), *bound_remarks(fitted.bound_fit)]
     click.echo("\n".join([table(fitted.plant_fit), *bound, *check_lines(fitted.checks)]))
 

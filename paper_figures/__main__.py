@@ -74,6 +74,23 @@ def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
         click.echo(f"{head}: {sentence}")
 
 
+@main.command("bode")
+@click.argument("model", type=click.Path(path_type=Path, dir_okay=False))
+@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--output", type=click.Path(path_type=Path), required=True, help="Existing folder to write to.")
+def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
+    """Draw SWEEP files, MODEL and the distances under W_a: bode.pdf, .svg and .png, with a caption in bode.txt."""
+    from identification.model.model_file import read_model
+    from identification.sweeps.read_sweeps import read_sweeps
+    from paper_figures.look.bode import plot_bode
+    from paper_figures.look.style import save
+
+    identified, tests = read_model(model), read_sweeps(sweeps)
+    names = ", ".join(test.name + (" (synthetic)" if test.synthetic else "") for test in tests)
+    caption = f"Magnitude and phase of {names} and of the model {model.name}, and their distance under the bound W_a."
+    save(plot_bode(identified, tests), output, "bode", caption)
+
+
 @main.command("report")
 @click.argument("model")
 @click.argument("sweeps", metavar="[SWEEP]...", nargs=-1, type=click.Path(path_type=Path))

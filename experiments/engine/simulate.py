@@ -22,7 +22,7 @@ MOST_ROOM = 1e8  # numbers, a gigabyte
 TAIL = 1e-11  # of a polynomial's terms, see integrate
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run:
     """A simulated run at the sample times.
 
@@ -45,6 +45,10 @@ class Run:
     outputs: Mapping[str, np.ndarray]
     events_s: np.ndarray
     modes: np.ndarray
+
+    def __repr__(self) -> str:
+        names, end = ", ".join(self.outputs), self.time_s[-1]
+        return f"Run({self.time_s.size} samples up to {end:.6g} s, {self.events_s.size} crossings, outputs {names})"
 
     def to_control(self) -> TimeResponseData:
         """The run as python-control's time response: the outputs by their names, and the input sat(u)."""

@@ -13,6 +13,8 @@ import numpy as np
 from identification.base.errors import InputError, MissingFile
 from identification.base.files import write_whole
 
+EXTRAS = {"dask": "campaign", "distributed": "campaign", "pyarrow": "campaign"}  # of pyproject.toml, by their modules
+
 
 class Refusal(click.ClickException):
     """How a command line shows an :class:`InputError`."""
@@ -24,7 +26,7 @@ class CommandGroup(click.Group):
     """A click group whose commands answer an :class:`InputError` with its sentence and exit status 2.
 
     So they do when finite numbers lead out of what floating point can hold: an overflow, a singular matrix, an
-    array larger than the memory.
+    array larger than the memory; and where a module of an extra is not installed.
 
     With ``--refusal FILE``, for a chain of commands that goes on without the one that refuses, the exit status is 0
     and the sentence stands in FILE too. A command that lacks an input, which one before it refused to write, then does
@@ -50,6 +52,11 @@ class CommandGroup(click.Group):
             sentence, is_missing = str(error), isinstance(error, MissingFile)
         except (ArithmeticError, np.linalg.LinAlgError, MemoryError) as error:
             sentence, is_missing = f"the numbers given are too extreme to compute with ({error})", False
+        except ModuleNotFoundError as error:
+            if error.name not in EXTRAS:
+                raise
+            extra = f'pip install "antiwindup-thesis[{EXTRAS[error.name]}]"'
+            raise Refusal(f"{error.name} is not installed, which this command needs; give {extra}") from None
         if refusal is None:
             raise Refusal(sentence)
         if is_missing:

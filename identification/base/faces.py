@@ -10,13 +10,13 @@ from typing import Any
 
 
 def face(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """What a package needs to import on request what the stub beside it names.
+    """What a package needs to import on request what the stub beside it imports.
 
     Parameters
     ----------
     package, file
         Its ``__name__`` and ``__file__``. In the ``.pyi`` beside the file stand lines such as
-        ``from design.auditing.audit_design import audit as audit``: the last name is that of the face.
+        ``from design.auditing.audit_design import Audit, audit``.
 
     Returns
     -------
@@ -24,13 +24,8 @@ def face(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], li
         ``__getattr__`` and ``__dir__`` of the package (PEP 562), and ``__all__``.
     """
     stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
-    homes = {
-        alias.asname: (str(node.module), alias.name)
-        for node in stub.body
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-        if alias.asname
-    }
+    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
+    homes = {alias.asname or alias.name: (str(node.module), alias.name) for node in imports for alias in node.names}
 
     def get(name: str) -> Any:
         if name not in homes:

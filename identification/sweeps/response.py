@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 FEWEST_LINES = 8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Record:
     """The raw record of a test.
 
@@ -39,8 +39,12 @@ class Record:
     output: Real
     held: bool
 
+    def __repr__(self) -> str:
+        held = ", held input" if self.held else ""
+        return f"Record({self.input.size} samples at {1 / self.sampling_s:g} Hz{held})"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class FrequencyResponse:
     """One test: the response of the plant at M lines.
 
@@ -73,6 +77,11 @@ class FrequencyResponse:
     synthetic: bool = False
     record: Record | None = None
     path: Path | None = None
+
+    def __repr__(self) -> str:
+        low, high = self.omega[[0, -1]] / (2 * np.pi)
+        synthetic = ", synthetic" if self.synthetic else ""
+        return f"FrequencyResponse('{self.name}', {self.omega.size} lines, {low:.4g} to {high:.4g} Hz{synthetic})"
 
     def to_control(self) -> FrequencyResponseData:
         """The response as python-control's frequency response data."""

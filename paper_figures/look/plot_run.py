@@ -36,6 +36,6 @@ def plot_run(run: Run) -> Figure:
     control.set_ylim(low - room, high + room)  # u may be many times the limits
     for panel, unit in ((output, "output unit"), (error, "output unit"), (control, "input unit")):
         panel.set_ylabel(unit)
-        panel.legend(loc="upper right", ncols=2)
+        panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=2)
     control.set_xlabel("time [s]")
     return figure

@@ -234,6 +234,10 @@ def test_no_prerequisite_is_forgotten(tree: Path, opened: dict[str, set[str]]) -
     assert not forgotten(tree, opened)
     assert {"data/thesis/thesis.toml", "experiments/tables.py"} <= opened["experiments thesis pid"]
     assert "paper_figures/look/figures.mplstyle" in opened["paper_figures draw fig_2_05"]
+    hang_on = prerequisites(tree)
+    for figure in FIGURES:
+        tables = {f"build/results/{table}.csv" for table in figure_module(figure).TABLES}
+        assert tables == {file for file in hang_on[f"build/figures/{figure}.svg"] if file.startswith("build/")}
 
 
 def test_a_forgotten_prerequisite_is_found(tree: Path, opened: dict[str, set[str]]) -> None:
