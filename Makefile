@@ -41,15 +41,15 @@ of_model = $(filter-out pid% conditions%,$(1))
 
 # CODE-ROOM-COMMAND and CODE-FIGURE, the files that each command and figure hangs on, and TABLES-FIGURE; the folders are
 # newer when a file comes or goes
-build/prerequisites.mk: tools/prerequisites.py $(shell find identification design experiments paper_figures data/thesis \
-		-name '*.py' -o -type d -not -name __pycache__)
+build/prerequisites.mk: tools/prerequisites.py $(shell find identification design experiments paper_figures \
+		data/thesis -name '*.py' -o -type d -not -name __pycache__)
 	@mkdir -p $(@D)
 	@$(PYTHON) $< $@
 ifneq (,$(filter-out help test lint bench study referee clean,$(or $(MAKECMDGOALS),help)))
 -include build/prerequisites.mk
 endif
 NAMES := $(sort $(basename $(notdir $(wildcard paper_figures/thesis/figures/fig_*.py))))
-OF_MODEL := $(foreach name,$(NAMES),$(if $(call of_model,$(TABLES-$(name))),$(name)))
+OF_MODEL := $(strip $(foreach name,$(NAMES),$(if $(call of_model,$(TABLES-$(name))),$(name))))
 
 .PHONY: help figures report refit claims test bench study referee lint clean
 help: ## say what there is
@@ -121,7 +121,8 @@ $(CHOICE): ;
 # refuses, its sentence is kept for the summary beside the first of FILES, and only what hangs on it is not made.
 define run
 $(if $(REFIT),@rm -f $(1))
-	$(strip $(PY) -m $(firstword $(2)) $(if $(REFIT),--refusal $(basename $(firstword $(1))).refused.txt) $(word 2,$(2)) $(3))
+	$(strip $(PY) -m $(firstword $(2)) $(if $(REFIT),--refusal $(basename $(firstword $(1))).refused.txt) \
+		$(word 2,$(2)) $(3))
 endef
 # $(call rule,FILES,ROOM [GROUP],COMMAND ...): FILES hang on the code of the command and on the files that it is given
 define rule
@@ -130,7 +131,8 @@ $(1) &: $(filter $(filter-out $(1),$(INPUTS)),$(3)) $(if $(filter $(CHOSEN),$(3)
 	$(call run,$(1),$(2),$(3))
 endef
 design = $(eval $(call rule,$(1),design,$(2) --output $(1)))
-tables = $(eval $(call rule,$(call csv,$(1)),$(or $(3),experiments thesis),$(2) --output $(RESULTS)))$(eval TABLES += $(1))
+tables = $(eval TABLES += $(1))$(eval \
+	$(call rule,$(call csv,$(1)),$(or $(3),experiments thesis),$(2) --output $(RESULTS)))
 INPUTS = $(MODEL_FILE) $(SWEEP_FILES) $(DESIGNS) $(CAMPAIGN)
 LIMITS := $(if $(LIMIT),--limit $(LIMIT))
 
@@ -139,7 +141,7 @@ $(FITTED): $(SWEEP_FILES) $(CODE-identification-fit) $(if $(MODEL),,$(CHOICE)) |
 		$(patsubst %,$(RESULTS)/%*,$(call of_model,$(TABLES))))
 	$(PY) -m identification fit $(SWEEPS) $(FIT) --output $@
 
-# With the thesis's references and free parameters; the last has a roll-off, so that W_a guarantees its loop's stability.
+# With the thesis's references and free parameters; the last has a roll-off, so that W_a guarantees its stability.
 DELAY_FREE := $(BUILD)/design_delay_free.json
 EXTENDED := $(BUILD)/design_extended.json
 ROBUST := $(BUILD)/design_robust.json
