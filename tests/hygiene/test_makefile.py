@@ -204,9 +204,14 @@ def prerequisites(tree: Path) -> dict[str, set[str]]:
     return {target: set(files.split(" | ")[0].split()) for target, files in lines}
 
 
-def forgotten(tree: Path, opened: dict[str, set[str]]) -> set[tuple[str, str]]:
+@pytest.fixture(scope="module")
+def hang_on(tree: Path) -> dict[str, set[str]]:
+    """That of the copy."""
+    return prerequisites(tree)
+
+
+def forgotten(hang_on: dict[str, set[str]], opened: dict[str, set[str]]) -> set[tuple[str, str]]:
     """Commands with the files that they open and whose targets make does not take for stale when these change."""
-    hang_on = prerequisites(tree)
     return {(command, file) for command, files in opened.items() for file in files - hang_on[TARGETS[command]]}
 
 
@@ -230,11 +235,10 @@ def commands_before(command: str) -> set[str]:
     return set()
 
 
-def test_no_prerequisite_is_forgotten(tree: Path, opened: dict[str, set[str]]) -> None:
-    assert not forgotten(tree, opened)
+def test_no_prerequisite_is_forgotten(hang_on: dict[str, set[str]], opened: dict[str, set[str]]) -> None:
+    assert not forgotten(hang_on, opened)
     assert {"data/thesis/thesis.toml", "experiments/tables.py"} <= opened["experiments thesis pid"]
     assert "paper_figures/look/figures.mplstyle" in opened["paper_figures draw fig_2_05"]
-    hang_on = prerequisites(tree)
     for figure in FIGURES:
         tables = {f"build/results/{table}.csv" for table in figure_module(figure).TABLES}
         assert tables == {file for file in hang_on[f"build/figures/{figure}.svg"] if file.startswith("build/")}
@@ -250,7 +254,7 @@ def test_a_forgotten_prerequisite_is_found(tree: Path, opened: dict[str, set[str
     ):
         file.write_text(re.sub(rf"(?m)^({name} :=.*) {module}", r"\1", text), encoding="utf-8")
         try:
-            assert forgotten(tree, opened) == {(command, module)}
+            assert forgotten(prerequisites(tree), opened) == {(command, module)}
         finally:
             file.write_text(text, encoding="utf-8")
 
@@ -271,11 +275,11 @@ def test_a_forgotten_prerequisite_is_found(tree: Path, opened: dict[str, set[str
     ],
 )
 def test_a_newer_file_makes_stale_what_hangs_on_it_alone(
-    tree: Path, opened: dict[str, set[str]], file: str, module: str | None
+    hang_on: dict[str, set[str]], opened: dict[str, set[str]], file: str, module: str | None
 ) -> None:
     """``module`` is what reads the file, where that is not imported."""
     expected = {command for command, files in opened.items() if (module or file) in files}
-    hang_on, stale = prerequisites(tree), {file}
+    stale = {file}
     for _ in range(6):  # as many steps as there are from a sweep to the report
         expected |= {command for command in TARGETS if commands_before(command) & expected}
         stale |= {target for target, files in hang_on.items() if files & stale}
