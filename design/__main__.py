@@ -12,7 +12,7 @@ import numpy as np
 
 from data.thesis import model_named
 from design.anti_windup.compensator import anti_windup
-from design.anti_windup.judge import SECTOR, facts
+from design.anti_windup.judge import SECTOR, Compensator, judge
 from design.auditing.as_text import audit_text
 from design.auditing.audit_design import audit
 from design.blocks.block import from_polynomial
@@ -84,14 +84,15 @@ def delay_free(
 ) -> None:
     """Chapter 2: internal model, H-infinity stabiliser, anti-windup; the plant's dead time is ignored."""
     design = design_delay_free(model_named(model), period, epsilon, recovery, sector, bandwidth)
-    hinf = design.hinf or {}
+    hinf = design.hinf
+    assert hinf is not None
     unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
     _finish(
         design,
         model,
         output,
-        f"H-infinity stabiliser: ||[W1 S; W2 T]|| = {upper_end(hinf['gamma'], 4)}, no stabilising controller below "
-        f"{lower_end(hinf['gamma_lower'], 4)}; every closed-loop pole left of -{lower_end(hinf['decay_rate'], 4)} 1/s"
+        f"H-infinity stabiliser: ||[W1 S; W2 T]|| = {upper_end(hinf.gamma, 4)}, no stabilising controller below "
+        f"{lower_end(hinf.gamma_lower, 4)}; every closed-loop pole left of -{lower_end(hinf.decay_rate, 4)} 1/s"
         f"{unstable}",
     )
 
@@ -160,7 +161,7 @@ def anti_windup_command(design: Path, name: str, numerator: str, denominator: st
     kind = anti_windup(from_polynomial(above) * from_polynomial(below).inverse())
     model = IdentifiedModel(content.loop_plant, content.additive_bound, None, {})
     _finish(
-        replace(content, anti_windup={**content.anti_windup, name: facts(model, kind)}),
+        replace(content, added={**content.added, name: Compensator(kind, judge(model, kind))}),
         str(design),
         output,
         f"with theta1~ = ({numerator})/({denominator}) as {name}",
@@ -199,10 +200,11 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
     write_whole({output: lambda path: path.write_text(text, encoding="utf-8")}, inputs=[Path(model)])
     click.echo(f"{design.kind} design -> {output}")
     click.echo(f"  {summary}")
-    for name, judged in design.anti_windup.items():
-        sector = "any" if judged["popov_sector"] is None else lower_end(judged["popov_sector"], 4)
-        stable = "stable" if judged["theta2_stable"] else "NOT stable: a lasting offset after saturation"
-        click.echo(f"  anti-windup {name:9s} f = {judged['f']:.4g}, Popov sector {sector}, theta2 {stable}")
+    for name, each in design.anti_windup.items():
+        judged = each.judgement
+        sector = "any" if judged.popov_sector is None else lower_end(judged.popov_sector, 4)
+        stable = "stable" if judged.theta2_stable else "NOT stable: a lasting offset after saturation"
+        click.echo(f"  anti-windup {name:9s} f = {judged.f:.4g}, Popov sector {sector}, theta2 {stable}")
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from data.thesis import model_named
-from design.anti_windup.compensator import AntiWindup, printed_form
+from design.anti_windup.compensator import AntiWindup, second_order
 from design.design_file import Design, read_design
 from experiments.drive.difference_equations import METHODS
 from experiments.drive.sampled_loop import Drive, simulate_sampled
@@ -163,7 +163,8 @@ def _compensator(design: Design, name: str, numbers: Mapping[str, float | None])
     if given and name != "thesis":
         raise InputError(f"--{next(iter(given))} belongs to --anti-windup thesis; found --anti-windup {name}")
     if given:
-        return printed_form({**design.anti_windup["thesis"], **given})
+        thesis = design.thesis
+        return second_order(**{"alpha": thesis.alpha, "beta": thesis.beta, "gamma": thesis.gamma} | given)
     return None if name == "none" else design.compensator(name)
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from design.anti_windup.corrected_compensator import SETTLED, corrected
 from design.anti_windup.popov import popov_sector, robust_loss, robust_popov_sector
 from design.anti_windup.thesis_compensator import thesis_choice
 from design.blocks.block import Block, bound_block, fastest_root, plant_block
+from identification.base.json_object import Reader, record
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
 
@@ -53,6 +54,70 @@ class Judgement:
     theta2_stable: bool
     lasting_offset: float | None
     recovery_s: float
+
+
+@dataclass(frozen=True)
+class Compensator:
+    """One anti-windup of a design.
+
+    Parameters
+    ----------
+    kind
+        theta1~.
+    judgement
+        What it is worth for the plant as the design sees it.
+    """
+
+    kind: AntiWindup
+    judgement: Judgement
+
+    def to_dict(self) -> dict[str, Any]:
+        """What was chosen, both blocks and the judgement, as design.json holds them."""
+        chosen = {name: value for name, value in vars(self).items() if name not in ("kind", "judgement")}
+        return chosen | self.kind.to_dict() | asdict(self.judgement)
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """Read what :meth:`to_dict` writes; raises InputError when it is not of that form."""
+        readers: dict[str, Reader] = {
+            "AntiWindup": lambda members, _: AntiWindup.from_dict(members),
+            "Judgement": lambda members, _: record(Judgement, members),
+        }
+        return record(cls, content, readers)
+
+
+@dataclass(frozen=True)
+class PrintedCompensator(Compensator):
+    """The thesis's.
+
+    Parameters
+    ----------
+    alpha, beta, gamma
+        Of (2.23); the time constants in seconds.
+    """
+
+    alpha: float
+    beta: float
+    gamma: float
+
+
+@dataclass(frozen=True)
+class CorrectedCompensator(Compensator):
+    """That of :func:`design.anti_windup.corrected_compensator.corrected`.
+
+    Parameters
+    ----------
+    sector
+        Of the circle criterion, which it was asked to meet.
+    bandwidth
+        In rad/s; no pole of theta1~ lies beyond.
+    f_lower
+        As of :class:`design.anti_windup.corrected_compensator.Corrected`.
+    """
+
+    sector: float
+    bandwidth: float
+    f_lower: float
 
 
 def judge(model: IdentifiedModel, kind: AntiWindup) -> Judgement:
@@ -115,8 +180,8 @@ def compensators(
     recovery_s: float | None = None,
     sector: float = SECTOR,
     bandwidth: float | None = None,
-) -> dict[str, dict[str, Any]]:
-    """The ``anti_windup`` member of design.json: the thesis's and the corrected compensator, each with its judgement.
+) -> tuple[PrintedCompensator, CorrectedCompensator]:
+    """The thesis's and the corrected compensator, each with its judgement.
 
     Parameters
     ----------
@@ -145,13 +210,8 @@ def compensators(
         bandwidth = max(fastest, 10 * float(np.log(1 / SETTLED)) / own_s)
     unstable, pace = plant_block(model.plant).unstable_poles, own_s if recovery_s is None else recovery_s
     found = corrected(unstable, bound, pace, sector, bandwidth, faster=recovery_s is not None)
-    return {
-        "thesis": {"alpha": alpha, "beta": beta, "gamma": gamma} | facts(model, second_order(alpha, beta, gamma)),
-        "corrected": {"sector": sector, "bandwidth": bandwidth, "f_lower": found.f_lower}
-        | facts(model, found.anti_windup),
-    }
-
-
-def facts(model: IdentifiedModel, kind: AntiWindup) -> dict[str, Any]:
-    """A compensator as design.json holds it: both blocks and what :func:`judge` says."""
-    return kind.to_dict() | asdict(judge(model, kind))
+    printed = second_order(alpha, beta, gamma)
+    return (
+        PrintedCompensator(printed, judge(model, printed), alpha, beta, gamma),
+        CorrectedCompensator(found.anti_windup, judge(model, found.anti_windup), sector, bandwidth, found.f_lower),
+    )

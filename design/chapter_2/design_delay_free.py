@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from design.anti_windup.compensator import printed_form
 from design.anti_windup.corrected_compensator import SETTLED
 from design.anti_windup.judge import SECTOR, compensators
 from design.blocks.block import Block, bound_block, plant_denominator, plant_numerator, require_thesis_class
@@ -14,6 +13,7 @@ from design.chapter_2.internal_model import InternalModel, internal_model, refer
 from design.design_file import Design
 from design.hinf.mixed_sensitivity import mixed_sensitivity
 from design.hinf.pick import Problem
+from design.parameters import DelayFreeParameters
 from identification.base.errors import InputError
 from identification.model.model_file import IdentifiedModel
 
@@ -99,10 +99,9 @@ def design_delay_free(
     hidden from the loop and not stabilised, so that a constant disturbance at the plant's input makes y drift.
     """
     units, problem = stabiliser_problem(model, period_s, epsilon)
-    W1, W2, decay_rate = problem.W1, problem.W2, problem.decay_rate
-    synthesis = mixed_sensitivity(problem.G, W1, W2, decay_rate)
-    anti_windup = compensators(model, math.log(1 / SETTLED) / (2 * decay_rate), recovery_s, sector, bandwidth)
-    thesis = printed_form(anti_windup["thesis"])
+    K, synthesis = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
+    own_s = math.log(1 / SETTLED) / (2 * problem.decay_rate)
+    thesis, corrected = compensators(model, own_s, recovery_s, sector, bandwidth)
     return Design(
         kind="delay-free",
         plant=model.plant,
@@ -113,22 +112,13 @@ def design_delay_free(
             "F1": units.F1,
             "F2": units.F2,
             "G_A": units.G_A,
-            "K": synthesis.K,
-            "theta1_tilde": thesis.theta1_tilde,
-            "theta1": thesis.theta1_tilde * units.one_plus_F,  # Eq. (2.17)
-            "theta2": thesis.theta2(model.plant.without_delay()),  # Eq. (2.18)
+            "K": K,
+            "theta1_tilde": thesis.kind.theta1_tilde,
+            "theta1": thesis.kind.theta1_tilde * units.one_plus_F,  # Eq. (2.17)
+            "theta2": thesis.kind.theta2(model.plant.without_delay()),  # Eq. (2.18)
         },
-        hinf={
-            "gamma_lower": synthesis.gamma_lower,
-            "reason": synthesis.reason,
-            "gamma": synthesis.gamma,
-            "decay_rate": decay_rate,
-            "gamma_line_lower": synthesis.gamma_line_lower,
-            "line_reason": synthesis.line_reason,
-            "gamma_line": synthesis.gamma_line,
-            "W1": W1,
-            "W2": W2,
-        },
-        anti_windup=anti_windup,
-        parameters={"period_s": period_s, "epsilon": epsilon},
+        hinf=synthesis,
+        parameters=DelayFreeParameters(period_s, epsilon),
+        thesis=thesis,
+        corrected=corrected,
     )

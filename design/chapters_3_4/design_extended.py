@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
-from design.anti_windup.compensator import printed_form
 from design.anti_windup.corrected_compensator import SETTLED
 from design.anti_windup.judge import SECTOR, compensators
 from design.blocks.block import Block, plant_block, plant_denominator, plant_numerator
@@ -15,6 +13,7 @@ from design.chapters_3_4.interpolate_Q import StableFunction, by_poles, by_zeros
 from design.chapters_3_4.robust_roll_off import robust_free_part
 from design.chapters_3_4.smith_predictor import free_part, stabiliser
 from design.design_file import Design
+from design.parameters import ExtendedParameters, Quotient, RollOff
 from identification.base.errors import InputError
 from identification.model.model_file import IdentifiedModel
 
@@ -71,12 +70,7 @@ def design_extended(
         "lagrange": lambda: lagrange(wanted),
         "poles": lambda: by_poles(wanted),
     }
-    parameters: dict[str, Any] = {
-        "a": a,
-        "pairs": [list(pair) for pair in pairs],
-        "method": method,
-        "inverse_epsilon": inverse_epsilon,
-    }
+    roll_off = None
     if robust_level is None:
         free = free_part(designs[method](), a)
     elif method != "zeros" or inverse_epsilon:
@@ -85,18 +79,13 @@ def design_extended(
         )
     else:
         redesign = robust_free_part(model, wanted, pairs, robust_level)
-        free = redesign.free
-        parameters |= {"robust_level": robust_level, "roll_off_order": redesign.order}
-        if redesign.order:
-            parameters["roll_off"] = redesign.rate
-    parameters["Q"] = {name: _attempt(design) for name, design in designs.items()}
+        free, roll_off = redesign.free, RollOff(robust_level, redesign.order, redesign.rate)
 
     K_0, K_1, K = stabiliser(model.plant, free.T_so, inverse_epsilon)
     F1 = plant_block(model.plant)
     # W_aw/(K R_0) with W_aw = -s T_so, Eq. (3.16), (3.17), (3.21), (3.29); it is -C_s S_s, (3.23)
     F2 = (free.T_so * plant_denominator(model.plant) * plant_numerator(model.plant).inverse()).scaled(-1.0)
-    anti_windup = compensators(model, float(np.log(1 / SETTLED)) / a, recovery_s, sector, bandwidth)
-    thesis = printed_form(anti_windup["thesis"])
+    thesis, corrected = compensators(model, float(np.log(1 / SETTLED)) / a, recovery_s, sector, bandwidth)
     return Design(
         kind="extended",
         plant=model.plant,
@@ -112,18 +101,26 @@ def design_extended(
             "K0": K_0,
             "K1": K_1,
             "K": K,
-            "theta1_tilde": thesis.theta1_tilde,
-            "theta2": thesis.theta2(model.plant),
+            "theta1_tilde": thesis.kind.theta1_tilde,
+            "theta2": thesis.kind.theta2(model.plant),
         },
         hinf=None,
-        anti_windup=anti_windup,
-        parameters=parameters,
+        parameters=ExtendedParameters(
+            a=a,
+            pairs=tuple((e, f) for e, f in pairs),
+            method=method,
+            inverse_epsilon=inverse_epsilon,
+            Q={name: _attempt(design) for name, design in designs.items()},
+            roll_off=roll_off,
+        ),
+        thesis=thesis,
+        corrected=corrected,
     )
 
 
-def _attempt(design: Callable[[], StableFunction]) -> dict[str, Any]:
+def _attempt(design: Callable[[], StableFunction]) -> Quotient | str:
     try:
         found = design()
     except InputError as error:
-        return {"refused": str(error)}
-    return {"numerator": list(found.numerator), "denominator": found.denominator.tolist()}
+        return str(error)
+    return Quotient(found.numerator, tuple(found.denominator.tolist()))

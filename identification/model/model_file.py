@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from identification.base.errors import InputError
-from identification.base.files import read_text
+from identification.base.json_object import member, number, numbers, read_json
 from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 SCHEMA = 1
@@ -76,8 +76,8 @@ def plant_from_dict(content: Mapping[str, Any]) -> PlantModel:
         pole_modes=_modes(content, "pole_modes"),
         delay_s=number(content, "delay_s"),
         integrators=content.get("integrators", 1),
-        real_zeros=_numbers(content, "real_zeros"),
-        real_poles=_numbers(content, "real_poles"),
+        real_zeros=_rates(content, "real_zeros"),
+        real_poles=_rates(content, "real_poles"),
     )
 
 
@@ -102,8 +102,8 @@ def bound_from_dict(content: Mapping[str, Any]) -> AdditiveBound:
         gain=number(content, "gain"),
         zero_modes=_modes(content, "zero_modes"),
         pole_modes=_modes(content, "pole_modes"),
-        real_zeros=_numbers(content, "real_zeros"),
-        real_poles=_numbers(content, "real_poles"),
+        real_zeros=_rates(content, "real_zeros"),
+        real_poles=_rates(content, "real_poles"),
     )
 
 
@@ -127,46 +127,6 @@ def read_model(path: Path) -> IdentifiedModel:
         raise InputError(f"{path}: {error}") from None
 
 
-def read_json(path: Path, schema: int) -> dict[str, Any]:
-    """Read a JSON object whose member ``schema`` must have the given value.
-
-    Raises
-    ------
-    InputError
-        No such file, not JSON, not an object, or another schema.
-    """
-    text = read_text(path)
-    try:
-        content = json.loads(text, parse_constant=_refuse_constant)
-    except json.JSONDecodeError as error:
-        raise InputError(f"{path}, line {error.lineno}: not JSON ({error.msg})") from None
-    except (RecursionError, ValueError) as error:  # an InputError among them
-        raise InputError(f"{path}: {error}") from None
-    found = content.get("schema") if isinstance(content, dict) else None
-    if found != schema:
-        raise InputError(f"{path}: schema is {found!r}; expected {schema}")
-    return content
-
-
-def member(content: Mapping[str, Any], key: str) -> Mapping[str, Any]:
-    """Return the JSON object at ``key``; raises InputError when there is none."""
-    value = content.get(key)
-    if not isinstance(value, Mapping):
-        raise InputError(f"'{key}' is {value!r}; expected an object")
-    return value
-
-
-def number(content: Mapping[str, Any], key: str) -> float:
-    """Return the number at ``key``; raises InputError when there is none."""
-    value = content.get(key)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"'{key}' is {value!r}; expected a number")
-    try:
-        return float(value)
-    except OverflowError:
-        raise InputError(f"'{key}' is an integer too large for a number") from None
-
-
 def _modes(content: Mapping[str, Any], key: str) -> tuple[Mode, ...]:
     modes = content.get(key)
     if not isinstance(modes, list) or not all(isinstance(mode, Mapping) for mode in modes):
@@ -174,13 +134,6 @@ def _modes(content: Mapping[str, Any], key: str) -> tuple[Mode, ...]:
     return tuple(Mode(omega=number(mode, "omega"), zeta=number(mode, "zeta")) for mode in modes)
 
 
-def _numbers(content: Mapping[str, Any], key: str) -> tuple[float, ...]:
+def _rates(content: Mapping[str, Any], key: str) -> tuple[float, ...]:
     """The list of numbers at ``key``; none where there is no such member."""
-    values = content.get(key, [])
-    if not isinstance(values, list):
-        raise InputError(f"'{key}' is {values!r}; expected a list of numbers")
-    return tuple(number({key: value}, key) for value in values)
-
-
-def _refuse_constant(name: str) -> float:
-    raise InputError(f"holds {name}; expected finite numbers only")
+    return numbers(content, key) if key in content else ()

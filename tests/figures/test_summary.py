@@ -15,8 +15,11 @@ from matplotlib.figure import Figure
 
 from data.thesis import model_named
 from design.anti_windup.compensator import second_order
+from design.anti_windup.judge import CorrectedCompensator, Judgement, PrintedCompensator
 from design.blocks.block import Block
 from design.design_file import Design
+from design.hinf.mixed_sensitivity import Synthesis
+from design.parameters import DelayFreeParameters, ExtendedParameters, RollOff
 from identification.base.errors import InputError
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, Mode, PlantModel
@@ -94,33 +97,24 @@ def model_of(plant: PlantModel, tests: list[FrequencyResponse], bound: AdditiveB
 
 
 def design_of(kind: str) -> Design:
-    judged = {"f": 0.0625, "popov_sector": None, "theta2_stable": False}
+    judged = Judgement(0.0625, 50.0, None, 0.0, 48.5, False, None, 0.125)
+    delay_free = kind == "delay-free"
     return Design(
         kind=kind,
         plant=plant_of(1),
         additive_bound=SIMPLE,
         reference_omegas=(1.5,),
         blocks={"K": Block(1.0, (), (1 + 0j,)), "C0": Block(1.0), "T_so": Block(1.0, (), (-4 + 0j, -1 + 2j, -1 - 2j))},
-        hinf={"gamma": 0.375, "gamma_lower": 0.3125} if kind == "delay-free" else None,
-        anti_windup={
-            "thesis": {
-                "alpha": 0.03,
-                "beta": 0.02,
-                "gamma": 48.5,
-                **judged,
-                **second_order(0.03, 0.02, 48.5).to_dict(),
-            },
-            "corrected": {
-                "sector": 0.75,
-                "recovery_s": 1.75,
-                "bandwidth": 275.0,
-                **judged,
-                "popov_sector": 1.0,
-                "theta2_stable": True,
-                **second_order(0.5, 0.5, -1.0).to_dict(),
-            },
-        },
-        parameters={},
+        hinf=Synthesis(0.3125, "", 0.375, 0.5, 0.3125, "", 0.375, Block(1.0), Block(1.0)) if delay_free else None,
+        parameters=DelayFreeParameters(4.0, 1e-4) if delay_free else ExtendedParameters(4.0, (), "zeros", 0.0, {}),
+        thesis=PrintedCompensator(second_order(0.03, 0.02, 48.5), judged, 0.03, 0.02, 48.5),
+        corrected=CorrectedCompensator(
+            second_order(0.5, 0.5, -1.0),
+            replace(judged, popov_sector=1.0, theta2_stable=True, recovery_s=1.75),
+            0.75,
+            275.0,
+            0.03125,
+        ),
     )
 
 
@@ -393,7 +387,8 @@ def test_panels_show_tests_model_and_bound():
 
 
 def test_the_robust_redesign_in_words() -> None:
-    design = replace(design_of("extended"), parameters={"roll_off": 45.5, "roll_off_order": 2})
+    plain = design_of("extended")
+    design = replace(plain, parameters=replace(plain.free, roll_off=RollOff(0.9, 2, 45.5)))
     table = pd.DataFrame(
         {
             "run": ["design_extended", "design_robust"],
@@ -406,5 +401,5 @@ def test_the_robust_redesign_in_words() -> None:
     for part in ("2 more poles of T_so at 45.5 rad/s", "= 0.875, where that design has 7.25", "1.5 ms to 144 ms"):
         assert part in said
     assert sentences(design, "robust", {}).endswith("45.5 rad/s.")
-    as_it_is = replace(design, parameters={"roll_off_order": 0})
+    as_it_is = replace(plain, parameters=replace(plain.free, roll_off=RollOff(0.9, 0, 45.5)))
     assert sentences(as_it_is, "robust", {}) == "As the design of chapters 3, 4."

@@ -284,11 +284,10 @@ def test_the_robust_sector_holds_for_drawn_uncertainties(best: Corrected) -> Non
 
 
 def test_compensators_of_a_design(implied: IdentifiedModel) -> None:
-    found = compensators(implied, 1.0)
-    assert set(found) == {"thesis", "corrected"}
-    assert found["corrected"]["bandwidth"] == pytest.approx(960.0)
-    assert found["corrected"]["lasting_offset"] == 0.0
-    assert found["thesis"]["lasting_offset"] == pytest.approx(7.105 * (1 + found["thesis"]["gamma"]), rel=1e-9)
+    thesis, own = compensators(implied, 1.0)
+    assert own.bandwidth == pytest.approx(960.0)
+    assert own.judgement.lasting_offset == 0.0
+    assert thesis.judgement.lasting_offset == pytest.approx(7.105 * (1 + thesis.gamma), rel=1e-9)
 
 
 @pytest.mark.parametrize("numbers", [(0.0, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, float("nan"))])

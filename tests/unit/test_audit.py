@@ -71,16 +71,17 @@ def test_chapter_two_with_and_without_its_dead_time(delay_free_design: Design) -
     assert found.infimum is not None
     assert delay_free_design.hinf is not None
     assert found.infimum.lower < found.infimum.upper < 1.01 * found.infimum.lower
-    assert found.infimum.upper < delay_free_design.hinf["gamma"]
+    assert found.infimum.upper < delay_free_design.hinf.gamma
 
 
 def test_what_the_stabiliser_reaches_is_not_taken_from_the_file(delay_free_design: Design) -> None:
     hinf, K = delay_free_design.hinf, delay_free_design.blocks["K"]
     assert hinf is not None
-    found = audit(dataclasses.replace(delay_free_design, hinf={**hinf, "gamma": 1e-9, "gamma_line_lower": 1.0}))
+    claimed = dataclasses.replace(hinf, gamma=1e-9, gamma_line_lower=1.0)
+    found = audit(dataclasses.replace(delay_free_design, hinf=claimed))
     assert isinstance(found.stabiliser, Synthesis)
     for name in ("gamma_lower", "gamma", "gamma_line_lower", "gamma_line", "decay_rate", "reason", "line_reason"):
-        assert getattr(found.stabiliser, name) == hinf[name]
+        assert getattr(found.stabiliser, name) == getattr(hinf, name)
     slower = audit(dataclasses.replace(delay_free_design, blocks={**delay_free_design.blocks, "K": K.scaled(0.01)}))
     assert isinstance(slower.stabiliser, str)
     assert "with K a closed-loop pole lies at Re s = " in slower.stabiliser

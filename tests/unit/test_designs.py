@@ -90,8 +90,8 @@ def test_delay_free_blocks_follow_from_each_other(delay_free_design: Design) -> 
 def test_delay_free_design_of_other_plants(implied: IdentifiedModel, name: str, period: float) -> None:
     design = design_delay_free(other_model(name, implied), period, 1e-4)
     assert design.hinf is not None
-    assert design.hinf["gamma_lower"] <= design.hinf["gamma"]
-    assert design.hinf["gamma_line"] <= 1.021 * design.hinf["gamma_line_lower"]
+    assert design.hinf.gamma_lower <= design.hinf.gamma
+    assert design.hinf.gamma_line <= 1.021 * design.hinf.gamma_line_lower
 
 
 @pytest.mark.parametrize(
@@ -208,7 +208,7 @@ def test_unstable_denominators_are_refused(e: float, f: float) -> None:
 
 
 def test_all_methods_are_recorded(extended_design: Design) -> None:
-    assert set(extended_design.parameters["Q"]) == set(METHODS)
+    assert set(extended_design.free.Q) == set(METHODS)
 
 
 def test_design_json_round_trip(extended_design: Design, delay_free_design: Design, tmp_path) -> None:  # type: ignore[no-untyped-def]
@@ -281,7 +281,7 @@ def test_the_redesign_is_robust_and_tracks(implied: IdentifiedModel, level: floa
 def test_a_design_that_meets_the_level_stays_as_it_is(table: IdentifiedModel) -> None:
     """With Table 2.1 as printed (zeta = 0.08 at 175 rad/s) |W_a C S| is 0.896."""
     design = design_extended(table, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9)
-    assert design.parameters["roll_off_order"] == 0
+    assert design.free.roll_off.order == 0
     plain = design_extended(table, [1.5], 4.0, [(2.0, 1.0)]).blocks["T_so"]
     np.testing.assert_allclose(design.blocks["T_so"](S), plain(S), rtol=1e-9)
 

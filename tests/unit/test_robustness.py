@@ -265,7 +265,7 @@ def test_tracking_floor(implied: IdentifiedModel, extended_design: Design) -> No
     without = dataclasses.replace(plant, integrators=0)
     assert tracking_floor(without, bound, [0.0]) == pytest.approx(bound.gain / plant.gain, rel=1e-12)
     # attained at the reference's frequency, exceeded elsewhere
-    omega = extended_design.parameters.get("reference_omegas", [1.5])[0]
+    omega = extended_design.reference_omegas[0]
     loop = delay_loop(extended_design, plant)
     s = np.array([1j * omega * (1 + 1e-7)])
     inner = 1 - loop.feedback(s) * np.exp(-loop.delay_s * s)

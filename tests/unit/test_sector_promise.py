@@ -126,7 +126,7 @@ def test_the_line_of_the_readme(extended_design: Design) -> None:
     assert not found.covered
     assert found.largest_control == pytest.approx(569.3, abs=0.1)
     assert found.largest_steady == pytest.approx(AMPLITUDE, rel=1e-3)
-    k = extended_design.anti_windup["corrected"]["popov_sector"]
+    k = extended_design.corrected.judgement.popov_sector
     assert found.guarantee.sector == pytest.approx(k, abs=1e-4)
     assert found.covered_control == pytest.approx((12 - k * AMPLITUDE) / (1 - k), rel=3e-3)
     assert found.needed_sector == pytest.approx(0.987, abs=5e-4)
@@ -232,7 +232,7 @@ def test_the_circle_criterion_by_brute_force(gamma: float, beta: float) -> None:
 def test_the_thesiss_compensator_has_no_guarantee(extended_design: Design) -> None:
     """Popov's condition holds for any sector, but by a multiplier, and theta2 integrates."""
     kind = extended_design.compensator("thesis")
-    assert extended_design.anti_windup["thesis"]["popov_sector"] is None
+    assert extended_design.thesis.judgement.popov_sector is None
     given_one = guarantee(extended_design, kind)
     assert given_one.sector == 0
     assert "theta2 is not stable" in given_one.missing

@@ -128,8 +128,7 @@ def _recovery(share: float, limit: float) -> float:
     design = chapter_4()
     model = model_named("implied")
     shorter = replace(model, plant=replace(model.plant, delay_s=share * model.plant.delay_s))
-    chosen = design.parameters
-    other = design_extended(shorter, design.reference_omegas, chosen["a"], chosen["pairs"])
+    other = design_extended(shorter, design.reference_omegas, design.free.a, design.free.pairs)
     reference = thesis_reference("extended", design.reference_omegas)
     loop = design_loop(other, reference, other.compensator("thesis"))
     return last_saturation(simulate(loop, (-limit, limit), np.array([0.0, PERIODS * reference.period_s])))
