@@ -159,7 +159,7 @@ def anti_windup_command(design: Path, name: str, numerator: str, denominator: st
         _coefficients(text, option) for text, option in ((numerator, "numerator"), (denominator, "denominator"))
     )
     kind = anti_windup(from_polynomial(above) * from_polynomial(below).inverse())
-    model = IdentifiedModel(content.loop_plant, content.additive_bound, None, {})
+    model = IdentifiedModel(content.loop_plant, content.additive_bound)
     _finish(
         replace(content, added={**content.added, name: Compensator(kind, judge(model, kind))}),
         str(design),

@@ -14,11 +14,12 @@ from identification.base.errors import InputError
 from identification.base.files import write_whole
 from identification.bound.bound_residuals import HIGHEST_ORDER, bound_residuals
 from identification.fitting.fit_plant import fit_plant
-from identification.fitting.subspace_check import SubspaceCheck, check_modes
+from identification.fitting.subspace_check import check_modes
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
+from identification.model.reports import SubspaceCheck
 from identification.model.structure import Wanted
-from identification.output.fit_facts import bound_remarks, bound_text, check_lines, facts, standard_errors, table
+from identification.output.fit_facts import bound_remarks, bound_text, check_lines, fit_record, standard_errors, table
 from identification.output.plots import draw_fit
 from identification.sweeps.read_sweeps import input_files, read_sweeps
 from identification.sweeps.response import FrequencyResponse, alias_free
@@ -103,8 +104,8 @@ def fit(
         checks = _checks(tests, [test.plant for test in result.tests], bar.update)
     clean = [alias_free(test, result.plant) for test in tests]
     report = bound_residuals(result.plant, clean, [test.plant for test in result.tests], bound_order)
-    model = IdentifiedModel(result.plant, report.bound, standard_errors(result), facts(tests, result, report, checks))
-    text = model.to_json()
+    record = fit_record(tests, result, report, checks)
+    text = IdentifiedModel(result.plant, report.bound, standard_errors(result), record).to_json()
     writers: dict[Path, Callable[[Path], object]] = {output: lambda path: path.write_text(text, encoding="utf-8")}
     with matplotlib.style.context(["default", {"svg.hashsalt": "identification", "font.size": 9}]):
         if figure is not None:

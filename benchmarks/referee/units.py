@@ -45,7 +45,7 @@ class Scaled(Case):
         """The model of the case in these units."""
         time, y, u = self.units
         model = case_of(self.seed, self.index).model
-        return IdentifiedModel(_plant(model.plant, time, y / u), _bound(model.additive_bound, time, y / u), None, {})
+        return IdentifiedModel(_plant(model.plant, time, y / u), _bound(model.additive_bound, time, y / u))
 
     @cached_property
     def options(self) -> dict[str, Any]:

@@ -81,7 +81,7 @@ def audit(design: Design) -> Audit:
     """
     _require_consistent(design)
     plant, bound = design.loop_plant, design.additive_bound
-    model = IdentifiedModel(plant, bound, None, {})
+    model = IdentifiedModel(plant, bound)
     forward, feedback = design.controller_parts()
     loop = delay_loop(design, plant)
     margins = _attempt(lambda: margins_of(loop, bound))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,6 +56,42 @@ class Mode:
         # Vieta for the small one: -zeta + spread cancels when zeta is large.
         far = -self.zeta - spread
         return complex(self.omega * far), complex(self.omega / far)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a plant.
+
+    Parameters
+    ----------
+    kind
+        ``gain``, ``zero`` or ``pole`` of a mode, ``real_zero``, ``real_pole`` or ``delay_s``.
+    index
+        From 1 among those of its kind.
+    quantity
+        ``omega`` or ``zeta`` of a mode, else empty.
+    value
+        In the units of :class:`PlantModel`.
+    """
+
+    kind: str
+    index: int
+    quantity: str
+    value: float
+
+    @property
+    def name(self) -> str:
+        """Of a column: gain, zero_omega_1, zero_zeta_1, ..., real_zero_1, ..., delay_s."""
+        if self.kind in ("gain", "delay_s"):
+            return self.kind
+        return "_".join(part for part in (self.kind, self.quantity, str(self.index)) if part)
+
+    @property
+    def label(self) -> str:
+        """In words, with the unit of what is no gain: zero mode 1, omega [rad/s]; real zero [rad/s]; delay [s]."""
+        if self.quantity:
+            return f"{self.kind} mode {self.index}, {self.quantity}" + " [rad/s]" * (self.quantity == "omega")
+        return {"gain": "gain", "delay_s": "delay [s]"}.get(self.kind, f"{self.kind.replace('_', ' ')} [rad/s]")
 
 
 @dataclass(frozen=True)
@@ -116,6 +153,22 @@ class PlantModel:
         s = np.asarray(s, dtype=np.complex128)
         lead = self.gain / s**self.integrators * np.exp(-self.delay_s * s)
         return np.asarray(lead * _quotient(self.zero_modes, self.real_zeros, self.pole_modes, self.real_poles, s))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Gain; omega and zeta of each zero mode, of each pole mode; real zeros, real poles; dead time."""
+        return tuple(self._parameters())
+
+    def _parameters(self) -> Iterator[Parameter]:
+        yield Parameter("gain", 1, "", self.gain)
+        for kind, modes in (("zero", self.zero_modes), ("pole", self.pole_modes)):
+            for index, mode in enumerate(modes, 1):
+                yield Parameter(kind, index, "omega", mode.omega)
+                yield Parameter(kind, index, "zeta", mode.zeta)
+        for kind, rates in (("real_zero", self.real_zeros), ("real_pole", self.real_poles)):
+            for index, rate in enumerate(rates, 1):
+                yield Parameter(kind, index, "", rate)
+        yield Parameter("delay_s", 1, "", self.delay_s)
 
     def without_delay(self) -> PlantModel:
         """The delay-free factor G(s) of chapter 2."""

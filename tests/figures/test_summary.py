@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import combinations, pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,8 +20,10 @@ from design.design_file import Design
 from design.hinf.mixed_sensitivity import Synthesis
 from design.parameters import DelayFreeParameters, ExtendedParameters, RollOff
 from identification.base.errors import InputError
+from identification.model.fit_record import Criterion, FitRecord, Noise, TestRecord
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.reports import BoundReport, Excess, ModeCheck, SubspaceCheck, Touch
 from identification.model.structure import Structure
 from identification.sweeps.response import FrequencyResponse
 from paper_figures.__main__ import main
@@ -59,41 +60,53 @@ def sweeps_of(plant: PlantModel, count: int, synthetic: bool = False) -> list[Fr
     ]
 
 
-def facts_of(plant: PlantModel, tests: list[FrequencyResponse]) -> dict[str, Any]:
+def record_of(plant: PlantModel, tests: list[FrequencyResponse], bound: AdditiveBound) -> FitRecord:
     zeros, poles = (
         2 * len(modes) + len(rates)
         for modes, rates in ((plant.zero_modes, plant.real_zeros), (plant.pole_modes, plant.real_poles))
     )
     structure = Structure(plant.integrators, zeros, poles)
-    values = np.array([value for _, value in structure.parameters(plant)])
 
-    def share(part: float) -> dict[str, Any]:
-        return structure.to_dict(part * values)
+    def share(part: float) -> tuple[float, ...]:
+        return tuple(part * parameter.value for parameter in plant.parameters)
 
-    each = {"noise": {"floor": 2e-4, "relative": 0.0125}, "chi_square": 1.02, "residual_correlation": 0.03}
-    return {
-        "structure": str(structure),
-        "synthetic": any(test.synthetic for test in tests),
-        "criterion": {
-            "name": "BIC",
-            "overdispersion": 1.0,
-            "by_structure": {str(structure): 5.0, "1 integrator": 99.0},
-        },
-        "intervals_95": {"lower": share(0.98), "upper": share(1.02)},
-        "noise_standard_errors": share(0.003),
-        "misfit_standard_errors": share(0.0),
-        "scatter_standard_errors": share(0.01) if len(tests) > 1 else None,
-        "agreement_of_tests": 1e-9 if len(tests) > 1 else None,
-        "tests": [{"name": test.name, "median_distance": 0.012, **each} for test in tests],
-        "bound": {
-            **{"order": 2, "mean_excess": 3.25, "largest_excess": 12.5, "least_excess": 11.75},
-            "touches": [{"omega": 55.5, "test": tests[0].name, "between_lines": False, "ratio": 1.0}],
-        },
-    }
+    return FitRecord(
+        source="identification fit",
+        synthetic=any(test.synthetic for test in tests),
+        structure=str(structure),
+        method="maximum likelihood",
+        loss="least squares",
+        criterion=Criterion("BIC", 1.0, {str(structure): 5.0, "1 integrator": 99.0}),
+        lower=share(0.98),
+        upper=share(1.02),
+        noise=share(0.003),
+        misfit=share(0.0),
+        scatter=share(0.01) if len(tests) > 1 else None,
+        agreement_of_tests=1e-9 if len(tests) > 1 else None,
+        tests=tuple(
+            TestRecord(
+                name=test.name,
+                lines=test.omega.size,
+                plant=plant,
+                standard_errors=share(0.003),
+                noise=Noise(2e-4, 0.0125),
+                chi_square=1.02,
+                residual_correlation=0.03,
+                median_distance=0.012,
+                sha256=None,
+                synthetic=test.synthetic,
+            )
+            for test in tests
+        ),
+        bound=BoundReport(
+            bound, 12.5, 3.25, 11.75, Excess(1.0, 1.0, 1.0), None, (Touch(55.5, tests[0].name, False, 1.0),)
+        ),
+        checks={},
+    )
 
 
 def model_of(plant: PlantModel, tests: list[FrequencyResponse], bound: AdditiveBound = SIMPLE) -> IdentifiedModel:
-    return IdentifiedModel(plant, bound, None, facts_of(plant, tests))
+    return IdentifiedModel(plant, bound, None, record_of(plant, tests, bound))
 
 
 def design_of(kind: str) -> Design:
@@ -260,19 +273,21 @@ def test_what_the_fit_leaves_is_said():
     plant = PlantModel(2.0, (), (Mode(20.0, 1.5e-5),), 0.0)
     tests = sweeps_of(plant, 2)
     model = model_of(plant, tests)
-    facts = dict(model.fit)
-    facts["tests"] = [entry | {"median_distance": 0.25} for entry in facts["tests"]]
-    facts["misfit_standard_errors"] = facts["noise_standard_errors"]
-    facts["agreement_of_tests"] = 0.5
-    facts["criterion"] = {"overdispersion": 19.5, "by_structure": {facts["structure"]: 5.0}}
-    mode = {"kind": "pole", "omega": 20.0, "zeta": 0.25}
-    found, missed = {"found_omega": 20.125, "found_zeta": 0.375}, {"found_omega": None, "found_zeta": None}
-    facts["subspace_check"] = [
-        {"test": "day_0.csv", "reason": None, "modes": [mode | found, mode | missed]},
-        {"test": "day_1.csv", "reason": None, "modes": [mode | found | {"found_omega": 20.5}, mode | missed]},
-        {"test": "day_2.csv", "reason": "too short", "modes": []},
-    ]
-    text = " ".join(summarise(IdentifiedModel(plant, SIMPLE, None, facts), tests, {}, {}).text().split())
+    fit = model.fit
+    found, missed = ModeCheck("pole", 20.0, 0.25, 20.125, 0.375), ModeCheck("pole", 20.0, 0.25, None, None)
+    fit = replace(
+        fit,
+        tests=tuple(replace(test, median_distance=0.25) for test in fit.tests),
+        misfit=fit.noise,
+        agreement_of_tests=0.5,
+        criterion=Criterion("BIC", 19.5, {fit.structure: 5.0}),
+        checks={
+            "day_0.csv": SubspaceCheck(4, 0.01, (found, missed)),
+            "day_1.csv": SubspaceCheck(4, 0.01, (replace(found, found_omega=20.5), missed)),
+            "day_2.csv": SubspaceCheck(4, 0.01, (), "too short"),
+        },
+    )
+    text = " ".join(summarise(replace(model, fit=fit), tests, {}, {}).text().split())
     for part in (
         "differ by no more: tests of one plant would differ as much with a probability of 0.5",
         "No other structure was tried. The deviance is divided by 19.5",
@@ -302,8 +317,8 @@ def test_an_interval_shows_two_digits_of_its_half_width(half, shown):
     plant = PlantModel(174.5, (), (), 0.0, 0)
     tests = sweeps_of(plant, 1)
     model = model_of(plant, tests)
-    ends = {"lower": {"gain": 174.5 - half, "delay_s": 0.0}, "upper": {"gain": 174.5 + half, "delay_s": 0.0}}
-    row = parameter_table(IdentifiedModel(plant, SIMPLE, None, dict(model.fit) | {"intervals_95": ends})).rows[0]
+    fit = replace(model.fit, lower=(174.5 - half, 0.0), upper=(174.5 + half, 0.0))
+    row = parameter_table(replace(model, fit=fit)).rows[0]
     assert row[2] == shown
 
 

@@ -71,7 +71,7 @@ class Units:
 
     def model(self, model: IdentifiedModel) -> IdentifiedModel:
         """Plant and bound; standard errors and what the fit says are left out."""
-        return IdentifiedModel(self.plant(model.plant), self.bound(model.additive_bound), None, {})
+        return IdentifiedModel(self.plant(model.plant), self.bound(model.additive_bound))
 
     def block(self, block: Block, factor: float = 1.0) -> Block:
         """``factor`` times the block at s times the unit of time."""

@@ -206,7 +206,7 @@ def test_the_fit_and_the_additive_error(units: Units, count: int) -> None:
         tests = measured(plant, each, count)
         fit = fit_plant(tests)
         report = bound_residuals(fit.plant, tests, [test.plant for test in fit.tests], 2)
-        model = IdentifiedModel(fit.plant, report.bound, None, {})
+        model = IdentifiedModel(fit.plant, report.bound)
         results.append((fit, report, additive_error_tables(model, tests)))
     (found, bound, errors), (expected, usual, usual_errors) = results
     assert found.structure == expected.structure

@@ -82,7 +82,7 @@ def test_a_signal_that_begins_with_any_power_of_time_is_that_power(
 def integrator(delay_s: float) -> IdentifiedModel:
     """7.1/s and a dead time: the simplest plant of the class."""
     bound = AdditiveBound.printed_form(0.1, 10.0, 150.0, 0.02)
-    return IdentifiedModel(PlantModel(7.1, (), (), delay_s), bound, None, {})
+    return IdentifiedModel(PlantModel(7.1, (), (), delay_s), bound)
 
 
 @lru_cache

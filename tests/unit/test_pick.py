@@ -46,7 +46,7 @@ def random_case(seed: int) -> Case:
         (float(corners[4]),) if order % 2 else (),
     )
     epsilon = float((reference * 10 ** rng.uniform(-3, -0.5)) ** 2)
-    return IdentifiedModel(plant, bound, None, {}), float(2 * np.pi / reference), epsilon
+    return IdentifiedModel(plant, bound), float(2 * np.pi / reference), epsilon
 
 
 def in_units(case: Case, time: float, gain: float) -> Case:
@@ -70,7 +70,7 @@ def in_units(case: Case, time: float, gain: float) -> Case:
         )
         for part, factor in ((model.plant, gain / time), (model.additive_bound, gain))
     ]
-    return IdentifiedModel(*scaled, None, {}), period * time, epsilon / time**2
+    return IdentifiedModel(*scaled), period * time, epsilon / time**2
 
 
 def synthesise(case: Case) -> tuple[Block, Synthesis]:
@@ -147,7 +147,7 @@ def test_an_infimum_that_rounding_misplaced() -> None:
     bound = AdditiveBound.printed_form(
         0.00015889051248297724, 92.07582172960379, 417.1357314232856, 0.025453737556454782
     )
-    _, problem = stabiliser_problem(IdentifiedModel(plant, bound, None, {}), 13.390762610209944, 1e-4)
+    _, problem = stabiliser_problem(IdentifiedModel(plant, bound), 13.390762610209944, 1e-4)
     _, found = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
     assert 0.0148981 / (1 + 2e-4) < found.gamma_lower < 0.0148981
     assert nehari_excess(problem.W1, problem.W2, found.gamma_lower, 60) > 0
@@ -159,7 +159,7 @@ def test_a_plant_far_faster_than_its_reference(period: float) -> None:
     """One real pole at 3e6 rad/s and W_a as far: eight decades between the slowest root and the fastest."""
     plant = PlantModel(3419.083098809311, (), (), 0.0, 1, (1709.6918018767112,), (3078760.8005179977,))
     bound = AdditiveBound.printed_form(0.3967886428549875, 595489.4621034386, 3078760.8005179977, 0.548136899856326)
-    _, found = synthesise((IdentifiedModel(plant, bound, None, {}), period, 1e-4))
+    _, found = synthesise((IdentifiedModel(plant, bound), period, 1e-4))
     assert found.gamma_line <= 1.01 * found.gamma_line_lower
 
 

@@ -287,7 +287,7 @@ def models(draw: st.DrawFn) -> IdentifiedModel:
     gain = draw(st.sampled_from([-1.0, 1.0])) * draw(st.floats(0.1, 30.0))
     plant = PlantModel(gain, tuple(modes[:count]), tuple(modes[count:]), draw(st.sampled_from([1e-3, 8e-3, 0.05])))
     bound = AdditiveBound.printed_form(0.002 * abs(gain), 20.0, draw(st.floats(100.0, 500.0)), 0.02)
-    return IdentifiedModel(plant, bound, None, {})
+    return IdentifiedModel(plant, bound)
 
 
 @some

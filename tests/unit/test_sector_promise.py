@@ -269,8 +269,6 @@ LIMIT_CYCLE = IdentifiedModel(
         (3955.6636938837983,),
         (),
     ),
-    None,
-    {},
 )
 
 

@@ -49,7 +49,7 @@ def trade_off_tables(design: Design, tick: Callable[[], object] = lambda: None) 
                 f = np.nan
             rows.append((sector, recovery_s, f, bandwidth))
             tick()
-    model = IdentifiedModel(design.plant, bound, None, {})
+    model = IdentifiedModel(design.plant, bound)
     alpha, beta, gamma, _ = least_f(bound, bandwidth)
     kinds = {
         "thesis": design.compensator("thesis"),
