@@ -23,7 +23,6 @@ from identification.base.command_line import CommandGroup
 from identification.base.digits import lower_end, upper_end
 from identification.base.errors import InputError
 from identification.base.files import write_whole
-from identification.model.model_file import IdentifiedModel
 
 OUTPUT = click.option(
     "--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="design.json to write."
@@ -83,7 +82,8 @@ def delay_free(
     output: Path,
 ) -> None:
     """Chapter 2: internal model, H-infinity stabiliser, anti-windup; the plant's dead time is ignored."""
-    design = design_delay_free(model_named(model), period, epsilon, recovery, sector, bandwidth)
+    given = model_named(model)
+    design = design_delay_free(given.plant, given.additive_bound, period, epsilon, recovery, sector, bandwidth)
     hinf = design.hinf
     assert hinf is not None
     unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
@@ -137,8 +137,19 @@ def extended(
     if len(e) != len(f):
         raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected as many")
     pairs = list(zip(e, f, strict=True))
+    given = model_named(model)
     design = design_extended(
-        model_named(model), omegas, a, pairs, method, inverse_epsilon, robust_level, recovery, sector, bandwidth
+        given.plant,
+        given.additive_bound,
+        omegas,
+        a,
+        pairs,
+        method,
+        inverse_epsilon,
+        robust_level,
+        recovery,
+        sector,
+        bandwidth,
     )
     poles = ", ".join(f"{pole:.4g}" for pole in design.blocks["T_so"].poles)
     _finish(design, model, output, f"Q designed by its {method}; closed loop with 1/s has the poles {poles}")
@@ -159,9 +170,9 @@ def anti_windup_command(design: Path, name: str, numerator: str, denominator: st
         _coefficients(text, option) for text, option in ((numerator, "numerator"), (denominator, "denominator"))
     )
     kind = anti_windup(from_polynomial(above) * from_polynomial(below).inverse())
-    model = IdentifiedModel(content.loop_plant, content.additive_bound)
+    judgement = judge(content.loop_plant, content.additive_bound, kind)
     _finish(
-        replace(content, added={**content.added, name: Compensator(kind, judge(model, kind))}),
+        replace(content, added={**content.added, name: Compensator(kind, judgement)}),
         str(design),
         output,
         f"with theta1~ = ({numerator})/({denominator}) as {name}",

@@ -14,8 +14,7 @@ from design.anti_windup.popov import popov_sector, robust_loss, robust_popov_sec
 from design.anti_windup.thesis_compensator import thesis_choice
 from design.blocks.block import Block, bound_block, fastest_root, plant_block
 from identification.base.json_object import Reader, record
-from identification.model.model_file import IdentifiedModel
-from identification.model.plant import PlantModel
+from identification.model.plant import AdditiveBound, PlantModel
 
 SECTOR = 0.95  # of the corrected compensator unless another is stated: |u| may reach twenty times the limits
 
@@ -120,9 +119,9 @@ class CorrectedCompensator(Compensator):
     f_lower: float
 
 
-def judge(model: IdentifiedModel, kind: AntiWindup) -> Judgement:
+def judge(plant: PlantModel, bound: AdditiveBound, kind: AntiWindup) -> Judgement:
     """Judge one anti-windup compensator for a plant and its bound."""
-    f, f_omega = uncertainty_cost(model.additive_bound, kind.one_plus)
+    f, f_omega = uncertainty_cost(bound, kind.one_plus)
     sector, multiplier = popov_sector(kind.theta1_tilde)
     slowest = min((-pole.real for pole in kind.one_plus.poles), default=np.inf)
     return Judgement(
@@ -131,8 +130,8 @@ def judge(model: IdentifiedModel, kind: AntiWindup) -> Judgement:
         popov_sector=sector if np.isfinite(sector) else None,
         popov_multiplier_s=multiplier,
         theta1_tilde_at_zero=float(kind.theta1_tilde(0j).real),
-        theta2_stable=kind.theta2(model.plant).is_stable,
-        lasting_offset=lasting_offset(model.plant, kind),
+        theta2_stable=kind.theta2(plant).is_stable,
+        lasting_offset=lasting_offset(plant, kind),
         recovery_s=float(np.log(1 / SETTLED)) / slowest,
     )
 
@@ -175,7 +174,8 @@ def robust_sector(
 
 
 def compensators(
-    model: IdentifiedModel,
+    plant: PlantModel,
+    bound: AdditiveBound,
     own_s: float,
     recovery_s: float | None = None,
     sector: float = SECTOR,
@@ -185,8 +185,8 @@ def compensators(
 
     Parameters
     ----------
-    model
-        Plant and W_a.
+    plant, bound
+        P and W_a.
     own_s
         Time in seconds in which the design's own transients fall to 1 %.
     recovery_s, sector
@@ -195,7 +195,7 @@ def compensators(
         faster than the loop may have a smaller f, and answers a saturation with a control many times the limits.
     bandwidth
         Of the corrected compensator in rad/s; unless given, that of the fastest root of the plant and of W_a, which is
-        as far as the model says anything, and at least ten times the rate ln(100)/own_s. It does not depend on
+        as far as they say anything, and at least ten times the rate ln(100)/own_s. It does not depend on
         ``recovery_s``, so that f does not increase with it.
 
     Raises
@@ -203,15 +203,16 @@ def compensators(
     InputError
         A number is out of its range, or no corrected compensator meets the sector.
     """
-    bound = model.additive_bound
     alpha, beta, gamma = thesis_choice(bound)
     if bandwidth is None:
-        fastest = fastest_root(plant_block(model.plant), bound_block(bound))
+        fastest = fastest_root(plant_block(plant), bound_block(bound))
         bandwidth = max(fastest, 10 * float(np.log(1 / SETTLED)) / own_s)
-    unstable, pace = plant_block(model.plant).unstable_poles, own_s if recovery_s is None else recovery_s
+    unstable, pace = plant_block(plant).unstable_poles, own_s if recovery_s is None else recovery_s
     found = corrected(unstable, bound, pace, sector, bandwidth, faster=recovery_s is not None)
     printed = second_order(alpha, beta, gamma)
     return (
-        PrintedCompensator(printed, judge(model, printed), alpha, beta, gamma),
-        CorrectedCompensator(found.anti_windup, judge(model, found.anti_windup), sector, bandwidth, found.f_lower),
+        PrintedCompensator(printed, judge(plant, bound, printed), alpha, beta, gamma),
+        CorrectedCompensator(
+            found.anti_windup, judge(plant, bound, found.anti_windup), sector, bandwidth, found.f_lower
+        ),
     )

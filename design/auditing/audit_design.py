@@ -21,7 +21,6 @@ from design.stability.characteristic_roots import CharacteristicRoots, largest_b
 from design.stability.jet import jet
 from design.stability.margins import Margins, delay_loop, margins_of, responses, tracking_floor
 from identification.base.errors import InputError
-from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, PlantModel
 
 Result = TypeVar("Result")
@@ -81,7 +80,6 @@ def audit(design: Design) -> Audit:
     """
     _require_consistent(design)
     plant, bound = design.loop_plant, design.additive_bound
-    model = IdentifiedModel(plant, bound)
     forward, feedback = design.controller_parts()
     loop = delay_loop(design, plant)
     margins = _attempt(lambda: margins_of(loop, bound))
@@ -122,7 +120,7 @@ def audit(design: Design) -> Audit:
         same_controller=same,
         stabiliser=reached,
         infimum=interval,
-        anti_windup={name: judge(model, kind) for name, kind in kinds.items()},
+        anti_windup={name: judge(plant, bound, kind) for name, kind in kinds.items()},
         robust_sector=sectors,
         least_f=least_f(bound, design.corrected.bandwidth),
     )

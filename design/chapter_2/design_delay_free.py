@@ -15,17 +15,19 @@ from design.hinf.mixed_sensitivity import mixed_sensitivity
 from design.hinf.pick import Problem
 from design.parameters import DelayFreeParameters
 from identification.base.errors import InputError
-from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, PlantModel
 
 TRACKING = 0.01  # W1 asks for |S| below gamma times this at the reference's frequencies
 
 
-def stabiliser_problem(model: IdentifiedModel, period_s: float, epsilon: float) -> tuple[InternalModel, Problem]:
+def stabiliser_problem(
+    plant: PlantModel, bound: AdditiveBound, period_s: float, epsilon: float
+) -> tuple[InternalModel, Problem]:
     """The internal model units, and what the stabiliser K has to minimise.
 
     Parameters
     ----------
-    model, period_s, epsilon
+    plant, bound, period_s, epsilon
         As for :func:`design_delay_free`.
 
     Raises
@@ -46,11 +48,11 @@ def stabiliser_problem(model: IdentifiedModel, period_s: float, epsilon: float) 
     """
     if not (math.isfinite(period_s) and period_s > 0):
         raise InputError(f"the period is {period_s:g} s; expected a positive number")
-    plant = model.plant.without_delay()
+    plant = plant.without_delay()
     require_thesis_class(plant)
     omega = 2 * math.pi / period_s
     units = internal_model(plant, omega, epsilon)
-    A, B, W_a = plant_denominator(plant), plant_numerator(plant), bound_block(model.additive_bound)
+    A, B, W_a = plant_denominator(plant), plant_numerator(plant), bound_block(bound)
     slowest = min(-root.real for root in A.zeros + B.zeros + W_a.poles if root != 0)
     decay_rate = min(math.log(1 / SETTLED) / period_s, slowest / 2)
 
@@ -64,7 +66,8 @@ def stabiliser_problem(model: IdentifiedModel, period_s: float, epsilon: float) 
 
 
 def design_delay_free(
-    model: IdentifiedModel,
+    plant: PlantModel,
+    bound: AdditiveBound,
     period_s: float,
     epsilon: float,
     recovery_s: float | None = None,
@@ -75,8 +78,8 @@ def design_delay_free(
 
     Parameters
     ----------
-    model
-        Plant (its dead time is ignored, as the thesis does) and W_a.
+    plant, bound
+        P (its dead time is ignored, as the thesis does) and W_a.
     period_s
         Period of the sinusoidal reference in seconds.
     epsilon
@@ -98,14 +101,14 @@ def design_delay_free(
     C = K A/Lambda has a zero at the plant's pole s = 0 (A(0) = 0; Lemma 1 assumes a stable A): the integrator is
     hidden from the loop and not stabilised, so that a constant disturbance at the plant's input makes y drift.
     """
-    units, problem = stabiliser_problem(model, period_s, epsilon)
+    units, problem = stabiliser_problem(plant, bound, period_s, epsilon)
     K, synthesis = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
     own_s = math.log(1 / SETTLED) / (2 * problem.decay_rate)
-    thesis, corrected = compensators(model, own_s, recovery_s, sector, bandwidth)
+    thesis, corrected = compensators(plant, bound, own_s, recovery_s, sector, bandwidth)
     return Design(
         kind="delay-free",
-        plant=model.plant,
-        additive_bound=model.additive_bound,
+        plant=plant,
+        additive_bound=bound,
         reference_omegas=(2 * math.pi / period_s,),
         blocks={
             "Lambda": units.Lambda,
@@ -115,7 +118,7 @@ def design_delay_free(
             "K": K,
             "theta1_tilde": thesis.kind.theta1_tilde,
             "theta1": thesis.kind.theta1_tilde * units.one_plus_F,  # Eq. (2.17)
-            "theta2": thesis.kind.theta2(model.plant.without_delay()),  # Eq. (2.18)
+            "theta2": thesis.kind.theta2(plant.without_delay()),  # Eq. (2.18)
         },
         hinf=synthesis,
         parameters=DelayFreeParameters(period_s, epsilon),

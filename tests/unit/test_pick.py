@@ -15,10 +15,9 @@ from design.chapter_2.design_delay_free import stabiliser_problem
 from design.hinf.closed_loop_norm import closed_loop_norm, closed_loop_poles
 from design.hinf.mixed_sensitivity import Synthesis, mixed_sensitivity
 from identification.base.digits import lower_end, upper_end
-from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, Mode, PlantModel
 
-Case = tuple[IdentifiedModel, float, float]  # model, period, epsilon
+Case = tuple[PlantModel, AdditiveBound, float, float]  # plant, bound, period, epsilon
 
 
 def random_case(seed: int) -> Case:
@@ -46,12 +45,12 @@ def random_case(seed: int) -> Case:
         (float(corners[4]),) if order % 2 else (),
     )
     epsilon = float((reference * 10 ** rng.uniform(-3, -0.5)) ** 2)
-    return IdentifiedModel(plant, bound), float(2 * np.pi / reference), epsilon
+    return plant, bound, float(2 * np.pi / reference), epsilon
 
 
 def in_units(case: Case, time: float, gain: float) -> Case:
     """The same plant in another unit of time and of its output."""
-    model, period, epsilon = case
+    plant, bound, period, epsilon = case
 
     def modes(old: tuple[Mode, ...]) -> tuple[Mode, ...]:
         return tuple(Mode(mode.omega / time, mode.zeta) for mode in old)
@@ -68,9 +67,9 @@ def in_units(case: Case, time: float, gain: float) -> Case:
             real_zeros=rates(part.real_zeros),
             real_poles=rates(part.real_poles),
         )
-        for part, factor in ((model.plant, gain / time), (model.additive_bound, gain))
+        for part, factor in ((plant, gain / time), (bound, gain))
     ]
-    return IdentifiedModel(*scaled), period * time, epsilon / time**2
+    return *scaled, period * time, epsilon / time**2
 
 
 def synthesise(case: Case) -> tuple[Block, Synthesis]:
@@ -81,7 +80,7 @@ def synthesise(case: Case) -> tuple[Block, Synthesis]:
 def in_old_units(K: Block, case: Case, time: float, gain: float) -> Block:
     """K back from the units of :func:`in_units`; G_A = B/Lambda has B(0) = gain/time and a monic Lambda."""
     zeros, poles = (tuple(root * time for root in roots) for roots in (K.zeros, K.poles))
-    degree = max(4, 2 * len(case[0].plant.zero_modes))
+    degree = max(4, 2 * len(case[0].zero_modes))
     return Block(K.gain * time**K.relative_degree * time ** (degree - 1) * gain, zeros, poles)
 
 
@@ -147,7 +146,7 @@ def test_an_infimum_that_rounding_misplaced() -> None:
     bound = AdditiveBound.printed_form(
         0.00015889051248297724, 92.07582172960379, 417.1357314232856, 0.025453737556454782
     )
-    _, problem = stabiliser_problem(IdentifiedModel(plant, bound), 13.390762610209944, 1e-4)
+    _, problem = stabiliser_problem(plant, bound, 13.390762610209944, 1e-4)
     _, found = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
     assert 0.0148981 / (1 + 2e-4) < found.gamma_lower < 0.0148981
     assert nehari_excess(problem.W1, problem.W2, found.gamma_lower, 60) > 0
@@ -159,7 +158,7 @@ def test_a_plant_far_faster_than_its_reference(period: float) -> None:
     """One real pole at 3e6 rad/s and W_a as far: eight decades between the slowest root and the fastest."""
     plant = PlantModel(3419.083098809311, (), (), 0.0, 1, (1709.6918018767112,), (3078760.8005179977,))
     bound = AdditiveBound.printed_form(0.3967886428549875, 595489.4621034386, 3078760.8005179977, 0.548136899856326)
-    _, found = synthesise((IdentifiedModel(plant, bound), period, 1e-4))
+    _, found = synthesise((plant, bound, period, 1e-4))
     assert found.gamma_line <= 1.01 * found.gamma_line_lower
 
 

@@ -14,7 +14,6 @@ from design.anti_windup.thesis_compensator import least_f
 from design.blocks.block import plant_block
 from design.design_file import Design
 from identification.base.errors import InputError
-from identification.model.model_file import IdentifiedModel
 
 SECTORS = (0.9, 0.95, 0.99, 0.999)
 RECOVERIES = 9  # recovery times, from the fastest that the bandwidth leaves room for
@@ -49,14 +48,13 @@ def trade_off_tables(design: Design, tick: Callable[[], object] = lambda: None) 
                 f = np.nan
             rows.append((sector, recovery_s, f, bandwidth))
             tick()
-    model = IdentifiedModel(design.plant, bound)
     alpha, beta, gamma, _ = least_f(bound, bandwidth)
     kinds = {
         "thesis": design.compensator("thesis"),
         "least": second_order(alpha, beta, gamma),
         "corrected": design.compensator("corrected"),
     }
-    summary = [{"run": name} | vars(judge(model, kind)) for name, kind in kinds.items()]
+    summary = [{"run": name} | vars(judge(design.plant, bound, kind)) for name, kind in kinds.items()]
     columns = ["run", "f", "popov_sector", "recovery_s", "lasting_offset"]
     return {
         "trade_off": pd.DataFrame(rows, columns=["sector", "recovery_s", "f", "bandwidth"]),
