@@ -27,7 +27,7 @@ from identification.sweeps.response import FrequencyResponse, alias_free
 FIGURES = (".pdf", ".svg", ".png")
 
 
-class Counts(click.ParamType):
+class Counts(click.ParamType):  # type: ignore[type-arg]  # generic in the newest click only
     """``auto`` (None), a number of zeros and of poles such as 1/2, or one number for both."""
 
     name = "counts"

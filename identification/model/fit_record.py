@@ -60,7 +60,7 @@ class Noise:
 
 
 @dataclass(frozen=True)
-class TestRecord:
+class FittedTest:
     """One test and its own fit.
 
     Parameters
@@ -83,8 +83,6 @@ class TestRecord:
         Whether it was never measured.
     """
 
-    __test__ = False  # not a test of pytest's
-
     name: str
     lines: int
     plant: PlantModel
@@ -105,7 +103,7 @@ class TestRecord:
         }
 
     @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> TestRecord:
+    def from_dict(cls, content: Mapping[str, Any]) -> FittedTest:
         """Read what :meth:`to_dict` writes; raises InputError when a member is missing or of the wrong form."""
         plant = plant_from_dict(member(content, "plant"))
         readers: dict[str, Reader] = {
@@ -157,7 +155,7 @@ class FitRecord:
     misfit: Numbers
     scatter: Numbers | None
     agreement_of_tests: float | None
-    tests: tuple[TestRecord, ...]
+    tests: tuple[FittedTest, ...]
     bound: BoundReport
     checks: Mapping[str, SubspaceCheck]
 
@@ -209,7 +207,7 @@ class FitRecord:
             misfit=values(content, "misfit_standard_errors"),
             scatter=or_none(values)(content, "scatter_standard_errors"),
             agreement_of_tests=or_none(number)(content, "agreement_of_tests"),
-            tests=tuple(TestRecord.from_dict(test) for test in objects(content, "tests")),
+            tests=tuple(FittedTest.from_dict(test) for test in objects(content, "tests")),
             bound=BoundReport.from_dict(member(content, "bound"), bound),
             checks={words(each, "test"): SubspaceCheck.from_dict(each) for each in objects(content, "subspace_check")},
         )

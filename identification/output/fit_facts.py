@@ -11,7 +11,7 @@ from identification.base.digits import lower_end
 from identification.fitting.first_guess import BOUNDS
 from identification.fitting.fit_plant import FitResult
 from identification.fitting.single_test_fit import OneFit
-from identification.model.fit_record import Criterion, FitRecord, Noise, Numbers, TestRecord
+from identification.model.fit_record import Criterion, FitRecord, FittedTest, Noise, Numbers
 from identification.model.plant import AdditiveBound, Mode, PlantModel
 from identification.model.reports import BoundReport, SubspaceCheck
 from identification.model.structure import in_physical_units
@@ -56,8 +56,8 @@ def fit_record(
     )
 
 
-def _test_record(test: FrequencyResponse, fit: OneFit) -> TestRecord:
-    return TestRecord(
+def _test_record(test: FrequencyResponse, fit: OneFit) -> FittedTest:
+    return FittedTest(
         name=fit.name,
         lines=fit.lines,
         plant=fit.plant,

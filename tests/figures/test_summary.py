@@ -20,7 +20,7 @@ from design.design_file import Design
 from design.hinf.mixed_sensitivity import Synthesis
 from design.parameters import DelayFreeParameters, ExtendedParameters, RollOff
 from identification.base.errors import InputError
-from identification.model.fit_record import Criterion, FitRecord, Noise, TestRecord
+from identification.model.fit_record import Criterion, FitRecord, FittedTest, Noise
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, Mode, PlantModel
 from identification.model.reports import BoundReport, Excess, ModeCheck, SubspaceCheck, Touch
@@ -84,7 +84,7 @@ def record_of(plant: PlantModel, tests: list[FrequencyResponse], bound: Additive
         scatter=share(0.01) if len(tests) > 1 else None,
         agreement_of_tests=1e-9 if len(tests) > 1 else None,
         tests=tuple(
-            TestRecord(
+            FittedTest(
                 name=test.name,
                 lines=test.omega.size,
                 plant=plant,

@@ -16,7 +16,8 @@ from scipy.optimize import brentq
 from data.thesis import printed
 from design.blocks.block import Block
 from design.design_file import Design
-from design.hinf.mixed_sensitivity import SynthesisError, mixed_sensitivity
+from design.hinf.mixed_sensitivity import mixed_sensitivity
+from design.hinf.pick import SynthesisError
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.physical_limits.integrator_bound import least_peak_error
 from experiments.runs.batch import Tick, threaded
