@@ -107,8 +107,15 @@ class Design:
         return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
 
-def read_design(path: Path) -> Design:
+def read_design(path: Path, kind: str | None = None) -> Design:
     """Read a design.json.
+
+    Parameters
+    ----------
+    path
+        The file.
+    kind
+        What it has to be, ``delay-free`` or ``extended``; either unless given.
 
     Raises
     ------
@@ -119,6 +126,8 @@ def read_design(path: Path) -> Design:
     try:
         if content.get("kind") not in KINDS:
             raise InputError(f"kind is {content.get('kind')!r}; expected one of {', '.join(KINDS)}")
+        if kind not in (None, content["kind"]):
+            raise InputError(f"kind is '{content['kind']}'; expected '{kind}'")
         delay_free = content["kind"] == "delay-free"
         hinf = None if content.get("hinf") is None else Synthesis.from_dict(member(content, "hinf"))
         anti_windup, blocks = member(content, "anti_windup"), member(content, "blocks")

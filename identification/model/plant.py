@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.base.arrays import Complex
 from identification.base.errors import InputError
+from identification.model.parameter import Parameter
+from identification.model.python_control import from_control, to_control
+
+if TYPE_CHECKING:
+    from control import TransferFunction
+
+HIGHEST_ORDER = 8
+"""Most poles of an additive bound that is fitted."""
 
 
 def _finite(**numbers: float) -> None:
@@ -56,42 +65,6 @@ class Mode:
         # Vieta for the small one: -zeta + spread cancels when zeta is large.
         far = -self.zeta - spread
         return complex(self.omega * far), complex(self.omega / far)
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One number of a plant.
-
-    Parameters
-    ----------
-    kind
-        ``gain``, ``zero`` or ``pole`` of a mode, ``real_zero``, ``real_pole`` or ``delay_s``.
-    index
-        From 1 among those of its kind.
-    quantity
-        ``omega`` or ``zeta`` of a mode, else empty.
-    value
-        In the units of :class:`PlantModel`.
-    """
-
-    kind: str
-    index: int
-    quantity: str
-    value: float
-
-    @property
-    def name(self) -> str:
-        """Of a column: gain, zero_omega_1, zero_zeta_1, ..., real_zero_1, ..., delay_s."""
-        if self.kind in ("gain", "delay_s"):
-            return self.kind
-        return "_".join(part for part in (self.kind, self.quantity, str(self.index)) if part)
-
-    @property
-    def label(self) -> str:
-        """In words, with the unit of what is no gain: zero mode 1, omega [rad/s]; real zero [rad/s]; delay [s]."""
-        if self.quantity:
-            return f"{self.kind} mode {self.index}, {self.quantity}" + " [rad/s]" * (self.quantity == "omega")
-        return {"gain": "gain", "delay_s": "delay [s]"}.get(self.kind, f"{self.kind.replace('_', ' ')} [rad/s]")
 
 
 @dataclass(frozen=True)
@@ -157,22 +130,38 @@ class PlantModel:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Gain; omega and zeta of each zero mode, of each pole mode; real zeros, real poles; dead time."""
-        return tuple(self._parameters())
-
-    def _parameters(self) -> Iterator[Parameter]:
-        yield Parameter("gain", 1, "", self.gain)
+        found = [Parameter("gain", 1, "", self.gain)]
         for kind, modes in (("zero", self.zero_modes), ("pole", self.pole_modes)):
             for index, mode in enumerate(modes, 1):
-                yield Parameter(kind, index, "omega", mode.omega)
-                yield Parameter(kind, index, "zeta", mode.zeta)
+                found += [Parameter(kind, index, what, getattr(mode, what)) for what in ("omega", "zeta")]
         for kind, rates in (("real_zero", self.real_zeros), ("real_pole", self.real_poles)):
-            for index, rate in enumerate(rates, 1):
-                yield Parameter(kind, index, "", rate)
-        yield Parameter("delay_s", 1, "", self.delay_s)
+            found += [Parameter(kind, index, "", rate) for index, rate in enumerate(rates, 1)]
+        return (*found, Parameter("delay_s", 1, "", self.delay_s))
 
     def without_delay(self) -> PlantModel:
         """The delay-free factor G(s) of chapter 2."""
         return replace(self, delay_s=0.0)
+
+    def to_control(self, pade_order: int = 0) -> TransferFunction:
+        """P(s) as python-control's transfer function, see :func:`identification.model.python_control.to_control`."""
+        gain, zeros, poles = _leading(self.gain, self.zero_modes, self.real_zeros, self.pole_modes, self.real_poles)
+        poles += [0j] * self.integrators
+        return to_control(gain, zeros, poles, self.delay_s, pade_order, "P")
+
+    @classmethod
+    def from_control(cls, system: object, delay_s: float = 0.0) -> PlantModel:
+        """The plant of a python-control system and a dead time in seconds.
+
+        Raises
+        ------
+        InputError
+            See :func:`identification.model.python_control.from_control`; or a root lies right of the imaginary axis,
+            or on it but for poles at s = 0.
+        """
+        gain, zeros, poles = from_control(system)
+        left = [pole for pole in poles if pole]
+        K, zero_modes, real_zeros, pole_modes, real_poles = _lowest(gain, zeros, left)
+        return cls(K, zero_modes, pole_modes, delay_s, len(poles) - len(left), real_zeros, real_poles)
 
 
 @dataclass(frozen=True)
@@ -245,6 +234,44 @@ class AdditiveBound:
         s = np.asarray(s, dtype=np.complex128)
         shape = _quotient(self.zero_modes, self.real_zeros, self.pole_modes, self.real_poles, s)
         return np.asarray(self.gain * shape)
+
+    def to_control(self) -> TransferFunction:
+        """W_a(s) as python-control's transfer function."""
+        return to_control(
+            *_leading(self.gain, self.zero_modes, self.real_zeros, self.pole_modes, self.real_poles), 0.0, 0, "W_a"
+        )
+
+    @classmethod
+    def from_control(cls, system: object) -> AdditiveBound:
+        """The bound |system|; raises InputError when it is not stable, minimum phase and as above."""
+        gain, zero_modes, real_zeros, pole_modes, real_poles = _lowest(*from_control(system))
+        return cls(abs(gain), zero_modes, pole_modes, real_zeros, real_poles)
+
+
+def _leading(
+    gain: float,
+    zero_modes: tuple[Mode, ...],
+    real_zeros: tuple[float, ...],
+    pole_modes: tuple[Mode, ...],
+    real_poles: tuple[float, ...],
+) -> tuple[float, list[complex], list[complex]]:
+    """Leading coefficient, zeros and poles in rad/s of gain * prod(zeros)/prod(poles), each factor 1 at s = 0."""
+    zeros = [*(root for mode in zero_modes for root in mode.roots), *(complex(-rate) for rate in real_zeros)]
+    poles = [*(root for mode in pole_modes for root in mode.roots), *(complex(-rate) for rate in real_poles)]
+    return float((gain * np.prod(np.negative(poles)) / np.prod(np.negative(zeros))).real), zeros, poles
+
+
+def _lowest(
+    gain: float, zeros: Sequence[complex], poles: Sequence[complex]
+) -> tuple[float, tuple[Mode, ...], tuple[float, ...], tuple[Mode, ...], tuple[float, ...]]:
+    """What :func:`_leading` takes from what it returns; pairs and rates in the order of their frequencies."""
+    low = float((gain * np.prod(np.negative(zeros)) / np.prod(np.negative(poles))).real)
+    modes, rates = [], []
+    for roots in (zeros, poles):
+        pairs = sorted((root for root in roots if root.imag > 0), key=abs)
+        modes.append(tuple(Mode(abs(root), -root.real / abs(root)) for root in pairs))
+        rates.append(tuple(sorted(-root.real for root in roots if root.imag == 0)))
+    return low, modes[0], rates[0], modes[1], rates[1]
 
 
 def _positive_rates(**rates: tuple[float, ...]) -> None:
