@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from html import escape
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,7 +25,7 @@ KINDS = ("delay-free", "extended")
 Named = TypeVar("Named")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Design:
     """A finished design of chapter 2 ("delay-free") or of chapters 3 and 4 ("extended").
 
@@ -60,6 +61,17 @@ class Design:
     thesis: PrintedCompensator
     corrected: CorrectedCompensator
     added: Mapping[str, Compensator] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        omegas = ", ".join(f"{omega:.4g}" for omega in self.reference_omegas)
+        return f"Design({self.kind}, reference at {omegas} rad/s, anti-windups {', '.join(self.anti_windup)})"
+
+    def _repr_html_(self) -> str:
+        """What each anti-windup is worth, as a notebook shows it."""
+        from pandas import DataFrame
+
+        table = DataFrame({name: asdict(each.judgement) for name, each in self.anti_windup.items()}).T
+        return f"<p>{escape(repr(self))}</p>{table.to_html()}"
 
     @property
     def loop_plant(self) -> PlantModel:

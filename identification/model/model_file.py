@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from identification.model.plant_json import (
 SCHEMA = 1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class IdentifiedModel:
     """What identification hands to design.
 
@@ -45,6 +46,25 @@ class IdentifiedModel:
     additive_bound: AdditiveBound
     standard_errors: Numbers | None = None
     fit: FitRecord | None = None
+
+    def __repr__(self) -> str:
+        plant = self.plant
+        zeros, poles = len(plant.zero_modes), len(plant.pole_modes)
+        return (
+            f"IdentifiedModel(gain {plant.gain:.4g}, {plant.integrators} integrators, {zeros} zero and {poles} pole "
+            f"modes, dead time {plant.delay_s:.4g} s; W_a of order {self.additive_bound.order})"
+        )
+
+    def _repr_html_(self) -> str:
+        """The plant's parameters with their standard errors, as a notebook shows them."""
+        from pandas import DataFrame
+
+        parameters = self.plant.parameters
+        names = [each.label for each in parameters]
+        table = DataFrame({"parameter": names, "value": [each.value for each in parameters]})
+        if self.standard_errors is not None:
+            table["standard error"] = self.standard_errors
+        return f"<p>{escape(repr(self))}</p>{table.to_html(index=False)}"
 
     def to_json(self) -> str:
         """The text of model.json; every number is finite or this raises ValueError."""
