@@ -1,9 +1,9 @@
-"""What the tests of all figures share: where their texts stand, and what a figure is saved as."""
+"""What the tests of all figures share: where their texts stand, and that they are drawn the same twice."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from pathlib import Path
+from io import BytesIO
 
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -13,8 +13,8 @@ from matplotlib.transforms import Bbox
 
 from paper_figures.look import style
 
+AsPdf = Callable[[Figure], bytes]
 Extents = Callable[[Figure, Callable[[Figure], Iterable[Text]]], list[tuple[str, Bbox]]]
-Saved = Callable[[Figure, str, str], dict[str, bytes]]
 
 
 @pytest.fixture
@@ -36,11 +36,13 @@ def extents() -> Extents:
 
 
 @pytest.fixture
-def saved(tmp_path: Path) -> Saved:
-    """The bytes of each file that a figure is saved as, by the name of the file."""
+def as_pdf() -> AsPdf:
+    """The bytes of a figure's PDF, which takes finite numbers only."""
 
-    def saved(figure: Figure, name: str, caption: str) -> dict[str, bytes]:
-        style.save(figure, tmp_path, name, caption)
-        return {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    def as_pdf(figure: Figure) -> bytes:
+        written = BytesIO()
+        with style.styled():
+            figure.savefig(written, format="pdf", metadata={"CreationDate": None, "ModDate": None})
+        return written.getvalue()
 
-    return saved
+    return as_pdf

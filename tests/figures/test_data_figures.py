@@ -463,7 +463,7 @@ def test_floor_and_runs_are_drawn_in_the_named_styles(letter, table, along, floo
 
 
 @pytest.mark.parametrize("row", [0, 4])
-def test_floor_under_one_limit(row, saved):
+def test_floor_under_one_limit(row, as_pdf):
     """Below what tracking needs, and above, where the floor is zero."""
     module, tables = figure_module("fig_a_04"), limits_tables()
     for kind in ("extended", "delay_free"):
@@ -472,18 +472,20 @@ def test_floor_under_one_limit(row, saved):
     limit, peak = tables["limits_delay_free"][["limit", "peak_corrected"]].iloc[0]
     assert panel.get_xlim()[0] < limit < panel.get_xlim()[1]
     assert panel.get_ylim()[0] < peak < panel.get_ylim()[1]
-    saved(module.draw(tables), "fig_a_04", module.caption(tables))
+    assert module.caption(tables)
+    as_pdf(module.draw(tables))
 
 
 @pytest.mark.parametrize("gone", [1e99, np.nan])
-def test_floor_stays_legible_beside_a_run_that_diverges(gone, saved):
+def test_floor_stays_legible_beside_a_run_that_diverges(gone, as_pdf):
     module, tables = figure_module("fig_a_04"), limits_tables()
     tables["limits_delay_free"]["peak_none"] = gone
     tables["limits_extended_summary"]["tail_none"] = gone
     figure = module.draw(tables)
     for panel, most in zip(lettered(figure), (5.0, 5.0), strict=True):
         assert 1e-3 < panel.get_ylim()[0] < most < panel.get_ylim()[1] < 1100.0
-    saved(figure, "fig_a_04", module.caption(tables))
+    assert module.caption(tables)
+    as_pdf(figure)
 
 
 def of_kind(panel: Axes, kind: str) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -527,14 +529,14 @@ def test_the_real_drive():
     assert "diverges" not in caption
 
 
-def test_a_drive_that_diverges_is_named(saved):
+def test_a_drive_that_diverges_is_named(as_pdf):
     tables = sampled_tables()
     summary = tables["sampled_summary"]
     gone = (summary["run"] == "thesis") & (summary["rate_hz"] == 320)
     summary.loc[gone, ["steady_error", "settling_s"]] = np.nan
     caption = fig_a_05.caption(tables)
     assert "it diverges: thesis, held inputs, 0.32 kHz; thesis, Tustin's rule, 0.32 kHz." in caption
-    assert len(saved(fig_a_05.draw(tables), "fig_a_05", caption)) == 4
+    as_pdf(fig_a_05.draw(tables))
     summary.loc[summary["rate_hz"].notna(), ["steady_error", "settling_s"]] = np.nan
     for run in ("none", "thesis", "corrected"):
         tables["sampled"][f"error_{run}_drive"] = np.nan
@@ -543,7 +545,7 @@ def test_a_drive_that_diverges_is_named(saved):
     assert 10 < figure.axes[0].get_ylim()[1] < 1e4
     assert "does not settle within the run with the drive" in fig_a_05.caption(tables)
     assert "is unbounded and unbounded with held inputs" in fig_a_05.caption(tables)
-    assert len(saved(figure, "fig_a_05", fig_a_05.caption(tables))) == 4
+    as_pdf(figure)
 
 
 def at(line: tuple[np.ndarray, np.ndarray], values: np.ndarray) -> np.ndarray:
@@ -595,20 +597,20 @@ def test_the_campaign():
     assert said in fig_a_06.caption(tables)
 
 
-def test_a_campaign_in_which_nothing_recovers_and_all_diverges(saved):
+def test_a_campaign_in_which_nothing_recovers_and_all_diverges(as_pdf):
     tables = campaign_tables()
     measures = ["peak_error", "steady_error", "recovery_s"]
     tables["campaign"]["recovery_s"] = np.nan
-    figure = fig_a_06.draw(tables)
-    assert len(saved(figure, "fig_a_06", fig_a_06.caption(tables))) == 4
+    assert fig_a_06.caption(tables)
+    as_pdf(fig_a_06.draw(tables))
     tables["campaign"][measures] = np.nan
     tables["campaign_summary"][["steady_error_50", "recovery_50_s"]] = np.nan
     caption = fig_a_06.caption(tables)
     assert "is unbounded" in caption
-    assert len(saved(fig_a_06.draw(tables), "fig_a_06", caption)) == 4
+    as_pdf(fig_a_06.draw(tables))
 
 
-def test_a_campaign_of_equal_or_vanishing_errors(saved):
+def test_a_campaign_of_equal_or_vanishing_errors(as_pdf):
     tables = campaign_tables()
     tables["campaign"]["peak_error"] = 50.0
     tables["campaign"]["steady_error"] = 0.0
@@ -616,7 +618,8 @@ def test_a_campaign_of_equal_or_vanishing_errors(saved):
     for panel in lettered(figure)[:2]:
         low, high = panel.get_xlim()
         assert low < high
-    assert len(saved(figure, "fig_a_06", fig_a_06.caption(tables))) == 4
+    assert fig_a_06.caption(tables)
+    as_pdf(figure)
 
 
 @pytest.mark.parametrize("name", ["fig_2_13", "fig_4_01", "fig_4_02", "fig_4_03", "fig_4_04"])
@@ -695,7 +698,7 @@ def test_captions_follow_the_data_not_the_thesis():
 
 
 @each_figure
-def test_summary_without_settling_or_last_saturation(name, saved):
+def test_summary_without_settling_or_last_saturation(name):
     tables = tables_of(name)
     module = figure_module(name)
     summary = tables[module.TABLES[1]]
@@ -707,12 +710,12 @@ def test_summary_without_settling_or_last_saturation(name, saved):
         assert "is saturated at the end of the run" in caption
     if "settling_s" in SAID[name]:
         assert "does not settle within the run" in caption
-    saved(module.draw(tables), name, caption)
+    assert module.draw(tables).axes
 
 
 @pytest.mark.parametrize("huge", [1e6, 1e99])
 @pytest.mark.parametrize("name", PANELS)
-def test_divergent_signals_leave_the_panel_and_the_reference_stays_legible(name, huge, saved):
+def test_divergent_signals_leave_the_panel_and_the_reference_stays_legible(name, huge, as_pdf):
     tables = tables_of(name)
     module = figure_module(name)
     table = tables[module.TABLES[0]]
@@ -722,7 +725,8 @@ def test_divergent_signals_leave_the_panel_and_the_reference_stays_legible(name,
     figure = module.draw(tables)
     for panel in figure.axes:
         assert np.ptp(panel.get_ylim()) < 500
-    saved(figure, name, module.caption(tables))
+    assert module.caption(tables)
+    as_pdf(figure)
 
 
 @each_figure
@@ -774,11 +778,10 @@ def test_lowest_panels_name_the_time(name):
 
 
 @each_figure
-def test_two_runs_write_the_same_bytes(name, saved):
+def test_two_drawings_are_the_same(name, as_pdf):
+    """What a format may add, such as a date, tests/figures/test_block_diagrams.py looks for in all of them."""
     module = figure_module(name)
-    runs = [saved(module.draw(tables_of(name)), name, module.caption(tables_of(name))) for _ in range(2)]
-    assert set(runs[0]) == {f"{name}.pdf", f"{name}.svg", f"{name}.png", f"{name}.txt"}
-    assert runs[0] == runs[1]
+    assert as_pdf(module.draw(tables_of(name))) == as_pdf(module.draw(tables_of(name)))
 
 
 @pytest.mark.parametrize("count", [10, 3000, 3001, 50000])
