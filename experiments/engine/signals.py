@@ -43,6 +43,19 @@ def fill(z: Array, n: int, k: int, j: int, c: Array, degree: int, radius: float,
 
 
 @njit(cache=True, nogil=True)
+def driven(z: Array, n: int, filled: Array, size: Array, reach: float) -> int:
+    """The degree to which the delayed signals in z, each ``filled`` (k,) to its own, matter within ``reach`` steps."""
+    degree, k = 0, len(filled)
+    for j in range(k):
+        top, power = filled[j], reach ** filled[j]
+        while top > degree and abs(z[n + 1 + k * top + j]) * power <= NEGLIGIBLE * size[1 + j]:
+            top -= 1
+            power /= reach
+        degree = max(degree, top)
+    return degree
+
+
+@njit(cache=True, nogil=True)
 def change(
     z: Array, n: int, k: int, j: int, past: Array, ago: float, now: Array, degree: int, radius: float, size: float,
     filled: Array, W: Array, work: Array,

@@ -102,23 +102,14 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
                 f"pole; expected at most {MOST_STEPS:.3g} (a shorter run, a dead time of zero, or a slower design)"
             )
         values, events, modes, status, end, _, tail = integrator.integrate(
-            compiled.unsaturated,
-            compiled.saturated,
-            compiled.tables,
-            compiled.delays,
-            compiled.brief,
-            compiled.x0,
+            compiled,
             loop.resets.times_s,
             loop.resets.values,
             float(low),
             float(high),
-            horizon,
-            step,
             time_s - compiled.lags[:, None],
-            compiled.groups,
-            int(MOST_STEPS),
-            most_events,
-            room,
+            horizon,
+            integrator.Bounds(int(MOST_STEPS), most_events, room),
         )
         if status == integrator.CROWDED:
             room *= 2
