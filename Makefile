@@ -98,6 +98,7 @@ lint: $(READY) ## check style and types
 	.venv/bin/ruff check --quiet .
 	.venv/bin/ruff format --quiet --check .
 	.venv/bin/mypy
+	.venv/bin/lint-imports --no-cache --no-logo
 
 clean: ## remove what was built, but for .venv
 	rm -rf build

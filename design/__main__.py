@@ -1,29 +1,27 @@
-"""Command line of this room: ``python -m design`` with delay-free, extended, anti-windup and audit."""
+"""Command line of this room: ``python -m design`` with delay-free, extended, anti-windup and audit.
+
+Each command imports what it runs, so that a command line answers at once, and make knows what each command hangs on.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
-from data.thesis import model_named
-from design.anti_windup.compensator import anti_windup
-from design.anti_windup.judge import SECTOR, facts
-from design.auditing.as_text import audit_text
-from design.auditing.audit_design import audit
-from design.blocks.block import from_polynomial
-from design.chapter_2.design_delay_free import design_delay_free
-from design.chapters_3_4.design_extended import METHODS, design_extended
-from design.design_file import Design, read_design
+from design.choices import METHODS, SECTOR
 from identification.base.command_line import CommandGroup
 from identification.base.digits import lower_end, upper_end
 from identification.base.errors import InputError
 from identification.base.files import write_whole
-from identification.model.model_file import IdentifiedModel
+
+if TYPE_CHECKING:
+    from design.design_file import Design
 
 OUTPUT = click.option(
     "--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="design.json to write."
@@ -83,6 +81,9 @@ def delay_free(
     output: Path,
 ) -> None:
     """Chapter 2: internal model, H-infinity stabiliser, anti-windup; the plant's dead time is ignored."""
+    from data.thesis import model_named
+    from design.chapter_2.design_delay_free import design_delay_free
+
     design = design_delay_free(model_named(model), period, epsilon, recovery, sector, bandwidth)
     hinf = design.hinf or {}
     unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
@@ -133,6 +134,9 @@ def extended(
     output: Path,
 ) -> None:
     """Chapters 3 and 4: Smith predictor based controller and anti-windup with the exact dead time."""
+    from data.thesis import model_named
+    from design.chapters_3_4.design_extended import design_extended
+
     if len(e) != len(f):
         raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected as many")
     pairs = list(zip(e, f, strict=True))
@@ -151,6 +155,12 @@ def extended(
 @OUTPUT
 def anti_windup_command(design: Path, name: str, numerator: str, denominator: str, output: Path) -> None:
     """Add a theta1~ of your own, strictly proper and stable, to those of DESIGN."""
+    from design.anti_windup.compensator import anti_windup
+    from design.anti_windup.judge import facts
+    from design.blocks.block import from_polynomial
+    from design.design_file import read_design
+    from identification.model.model_file import IdentifiedModel
+
     content = read_design(design)
     if name in ("none", "thesis", "corrected") or not re.fullmatch(r"[\w-]+", name):
         raise InputError(f"--name is '{name}'; expected letters, digits, _ and -, and not none, thesis or corrected")
@@ -178,6 +188,10 @@ def anti_windup_command(design: Path, name: str, numerator: str, denominator: st
 )
 def audit_command(design: Path, windup: float) -> None:
     """Print stability, margins and |W_a C S| of DESIGN with the exact dead time, and judge every anti-windup in it."""
+    from design.auditing.as_text import audit_text
+    from design.auditing.audit_design import audit
+    from design.design_file import read_design
+
     if not abs(windup) < 1e100:
         raise InputError(f"--windup is {windup:g}; expected a number of less than 1e100")
     content = read_design(design)
@@ -189,7 +203,7 @@ def _coefficients(text: str, option: str) -> list[float]:
         found = [float(word) for word in text.replace(",", " ").split()]
     except ValueError:
         found = []
-    if not found or not np.isfinite(found).all() or not any(found):
+    if not any(found) or not all(map(isfinite, found)):
         raise InputError(f"--{option} is '{text}'; expected coefficients such as '1 2.5 3', not all 0")
     return found
 

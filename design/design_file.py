@@ -100,8 +100,15 @@ class Design:
         return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
 
-def read_design(path: Path) -> Design:
+def read_design(path: Path, kind: str | None = None) -> Design:
     """Read a design.json.
+
+    Parameters
+    ----------
+    path
+        The file.
+    kind
+        What it has to be, ``delay-free`` or ``extended``; either unless given.
 
     Raises
     ------
@@ -112,6 +119,8 @@ def read_design(path: Path) -> Design:
     try:
         if content.get("kind") not in KINDS:
             raise InputError(f"kind is {content.get('kind')!r}; expected one of {', '.join(KINDS)}")
+        if kind not in (None, content["kind"]):
+            raise InputError(f"kind is '{content['kind']}'; expected '{kind}'")
         hinf = content.get("hinf")
         if hinf is not None:
             hinf = dict(member(content, "hinf"))

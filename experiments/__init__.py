@@ -1,15 +1,36 @@
-"""Designs -> saturated closed loops with an exact dead time -> the tables behind every figure."""
+"""Designs -> saturated closed loops with an exact dead time -> runs, and the tables behind every figure.
+
+>>> import design, experiments, identification
+>>> Mode = identification.Mode
+>>> plant = identification.PlantModel(7.0, (Mode(200.0, 0.05),), (Mode(300.0, 0.02),), delay_s=0.01)
+>>> bound = identification.AdditiveBound.printed_form(gain=0.01, corner=100.0, omega=300.0, zeta=0.1)
+>>> model = identification.IdentifiedModel(plant, bound)
+>>> own = design.extended(model, reference_omegas=[1.5], a=4.0, pairs=[(2.0, 1.0)])
+>>> reference = experiments.sinusoid(amplitude=50.0, omega=1.5, phase_rad=0.0, offset=0.0)
+>>> run = experiments.simulate(own, limits=11.0, reference=reference, anti_windup="corrected")
+>>> run
+Run(5001 samples up to 20.944 s, 2 crossings, outputs reference, output, error, y_lin, v)
+>>> bool(abs(run.saturated_control).max() <= 11.0)
+True
+"""
 
 import hashlib
 import os
 import sys
 from pathlib import Path
 
+from identification.base.faces import face
+
+__getattr__, __dir__, __all__ = face(__name__, __file__)
+
 # numba looks only at the module of a compiled function for changes, not at those that it calls into: a cache for each
-# state of them all, unless the user has one
-_texts = [path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py"))]
+# state of them all, unless the user has one; in the user's cache folder where the package may not be written to
+_room = Path(__file__).parent
+_texts = [path.read_bytes() for path in sorted(_room.rglob("*.py"))]
 _digest = hashlib.sha256(b"".join(text for text in _texts if b"njit" in text)).hexdigest()[:16]
 if "NUMBA_CACHE_DIR" not in os.environ:
-    os.environ["NUMBA_CACHE_DIR"] = str(Path(__file__).parent / "__pycache__" / f"numba-{_digest}")
+    _own, _users = _room / "__pycache__", os.environ.get("XDG_CACHE_HOME", "~/.cache")
+    _cache = _own if os.access(_room, os.W_OK) else Path(_users).expanduser() / "antiwindup"
+    os.environ["NUMBA_CACHE_DIR"] = str(_cache / f"numba-{_digest}")
     if "numba" in sys.modules:  # which has read its environment already
         sys.modules["numba"].config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"]

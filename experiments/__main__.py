@@ -1,6 +1,6 @@
 """Command line of this room: runs of a design, campaigns, limits; and the group ``thesis``, which reproduces the print.
 
-What takes long to import, and only one command needs, that command imports.
+Each command imports what it runs, so that a command line answers at once, and make knows what each command hangs on.
 """
 
 from __future__ import annotations
@@ -9,12 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import click
-from tqdm import tqdm
 
-from design.design_file import read_design
 from experiments.campaign.command import campaign_command
-from experiments.campaign.distributions import campaign_tables
-from experiments.options import DESIGN, OUTPUT_FOLDER, sinusoid_options, sinusoids
+from experiments.options import DESIGN, OUTPUT_FOLDER, sinusoid_options
 from experiments.run_commands import sampled_command, simulate_command
 from experiments.tables import write_into
 from experiments.thesis.commands import thesis
@@ -37,6 +34,8 @@ main.add_command(thesis)
 @OUTPUT_FOLDER
 def campaign_distributions(campaign: Path, output: Path) -> None:
     """The distributions of a CAMPAIGN: campaign.csv, campaign_distance.csv, campaign_summary.csv."""
+    from experiments.campaign.distributions import campaign_tables
+
     write_into(output, campaign_tables(campaign))
 
 
@@ -49,6 +48,10 @@ def campaign_distributions(campaign: Path, output: Path) -> None:
 @OUTPUT_FOLDER
 def limits(design: Path, limits: tuple[float, ...], output: Path, **reference: Any) -> None:
     """What no controller of DESIGN's plant can better: limits_KIND.csv, limits_KIND_summary.csv (the first LIMIT)."""
+    from tqdm import tqdm
+
+    from design.design_file import read_design
+    from experiments.asked_reference import sinusoids
     from experiments.physical_limits.least_peak_error import limits_tables
 
     content = read_design(design)

@@ -1,4 +1,4 @@
-"""Options that several commands of this room take, and what they mean."""
+"""Options that several commands of this room take; :mod:`experiments.asked_reference` has what they ask for."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ from pathlib import Path
 
 import click
 
-from design.design_file import Design
-from experiments.runs.reference_file import read_reference
-from experiments.runs.references import Reference, SampledReference
 from identification.base.errors import InputError
 
 DESIGN = click.argument("design", type=click.Path(path_type=Path, dir_okay=False))
@@ -18,14 +15,13 @@ OUTPUT_FOLDER = click.option(
 )
 _SINUSOIDS = (
     click.option("--amplitude", type=float, multiple=True, help="Of the reference; once a frequency of DESIGN."),
-    click.option("--phase", type=float, multiple=True, help="In radians; once a frequency, 0 unless given."),
-    click.option("--offset", type=float, default=0.0, help="Of the reference, 0 unless given."),
+    click.option("--phase", type=float, multiple=True, help="In radians; once a frequency; 0 unless given."),
+    click.option("--offset", type=float, help="Of the reference, 0 unless given."),
 )
 _OTHERS = (
     click.option(
         "--slope",
         type=float,
-        default=0.0,
         help="Of a ramp added to the reference, a second; --amplitude 0 leaves it alone.",
     ),
     click.option(
@@ -37,67 +33,17 @@ _OTHERS = (
 
 
 def sinusoid_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command ``--amplitude``, ``--phase`` and ``--offset``, see :func:`sinusoids`."""
+    """Give a command ``--amplitude``, ``--phase`` and ``--offset``."""
     for option in reversed(_SINUSOIDS):
         command = option(command)
     return command
 
 
 def reference_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command those and ``--slope`` and ``--reference``, see :func:`reference_of`."""
+    """Give a command these and ``--slope`` and ``--reference``."""
     for option in reversed(_OTHERS):
         command = option(command)
     return sinusoid_options(command)
-
-
-def sinusoids(
-    design: Design, amplitude: tuple[float, ...], phase: tuple[float, ...], offset: float, slope: float = 0.0
-) -> Reference:
-    """The reference at the frequencies of a design.
-
-    Parameters
-    ----------
-    design
-        Has the frequencies.
-    amplitude, phase
-        One for each frequency, in the plant's output unit and in radians; no phases are phases of 0.
-    offset, slope
-        In the plant's output unit, and in that unit per second.
-
-    Raises
-    ------
-    InputError
-        There is no amplitude, there are not as many of each as the design has frequencies, or one is not finite.
-    """
-    omegas = design.reference_omegas
-    if not amplitude:
-        said = ", ".join(f"{omega:g}" for omega in omegas)
-        raise InputError(f"no --amplitude is given; expected one for each frequency of the design, {said} rad/s")
-    return Reference(amplitude, omegas, phase or (0.0,) * len(omegas), offset, slope)
-
-
-def reference_of(
-    design: Design,
-    amplitude: tuple[float, ...],
-    phase: tuple[float, ...],
-    offset: float,
-    slope: float,
-    reference: Path | None,
-) -> Reference | SampledReference:
-    """The reference of sinusoids, see :func:`sinusoids`, or the one of a file.
-
-    Raises
-    ------
-    InputError
-        Options of both are given, or see :func:`sinusoids` and
-        :func:`experiments.runs.reference_file.read_reference`.
-    """
-    if reference is None:
-        return sinusoids(design, amplitude, phase, offset, slope)
-    for name, value in {"amplitude": amplitude, "phase": phase, "offset": offset, "slope": slope}.items():
-        if value:
-            raise InputError(f"--{name} belongs to a reference of sinusoids; found --reference {reference} too")
-    return read_reference(reference)
 
 
 def positive_limit(limit: float | None) -> float | None:

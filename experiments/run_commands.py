@@ -3,28 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
-import pandas as pd
 
-from data.thesis import model_named
-from design.anti_windup.compensator import AntiWindup, printed_form
-from design.design_file import Design, read_design
-from experiments.drive.difference_equations import METHODS
-from experiments.drive.sampled_loop import Drive, simulate_sampled
-from experiments.engine.simulate import simulate
-from experiments.options import DESIGN, positive_limit, reference_of, reference_options
-from experiments.runs.design_loop import design_loop
-from experiments.runs.guarantee import guarantee
-from experiments.runs.metrics import last_saturation
-from experiments.runs.sector_promise import judge_run, steady_control, verdict
+from experiments.options import DESIGN, positive_limit, reference_options
 from experiments.tables import write_tables
 from identification.base.errors import InputError
-from identification.model.plant import PlantModel
 
 MOST_ROWS = 1e7
 
@@ -68,17 +55,36 @@ def simulate_command(
     **reference: Any,
 ) -> None:
     """Run DESIGN from rest: time_s, reference, output, error, control, saturated_control."""
+    import numpy as np
+    import pandas as pd
+
+    from data.thesis import model_named
+    from design.anti_windup.compensator import printed_form
+    from design.design_file import read_design
+    from experiments.asked_reference import reference_of
+    from experiments.engine.simulate import simulate
+    from experiments.runs.design_loop import design_loop
+    from experiments.runs.guarantee import guarantee
+    from experiments.runs.metrics import last_saturation
+    from experiments.runs.sector_promise import judge_run
+
     positive_limit(limit)
-    if not (np.isfinite([until, sample_time]).all() and 0 < sample_time <= until):
+    if not 0 < sample_time <= until < math.inf:
         raise InputError(
             f"--until is {until:g} and --sample-time {sample_time:g}; expected 0 < sample time <= until, both finite"
         )
     _require_few_rows(until / sample_time)
+    numbers = {name: value for name, value in (("alpha", alpha), ("beta", beta), ("gamma", gamma)) if value is not None}
+    if numbers and anti_windup != "thesis":
+        raise InputError(f"--{next(iter(numbers))} belongs to --anti-windup thesis; found --anti-windup {anti_windup}")
     content = read_design(design)
-    kind = _compensator(content, anti_windup, {"alpha": alpha, "beta": beta, "gamma": gamma})
+    kind = None if anti_windup == "none" else content.compensator(anti_windup)
+    if numbers:
+        kind = printed_form({**content.anti_windup["thesis"], **numbers})
     # the quotient of two decimals may come out a rounding below a whole number
     time_s = sample_time * np.arange(int(until / sample_time * (1 + 1e-12)) + 1)
-    limits, asked, true = (-limit, limit), reference_of(content, **reference), _true_plant(plant)
+    limits, asked = (-limit, limit), reference_of(content, **reference)
+    true = None if plant is None else model_named(plant).plant
     loop = design_loop(content, asked, kind, true)
     run = simulate(loop, limits, time_s)
     table = pd.DataFrame(
@@ -106,7 +112,7 @@ def simulate_command(
 @click.command("sampled")
 @_run_options
 @click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
-@click.option("--method", type=click.Choice(METHODS), required=True, help="How its blocks are discretised.")
+@click.option("--method", required=True, help="How its blocks are discretised, tustin or exact.")
 @click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels; 0, no levels, by default.")
 @click.option("--slew", type=float, default=math.inf, help="Most change of the actuator in a second; inf by default.")
 @click.option("--input-delay", type=float, default=0.0, help="From sample to actuator in seconds; 0 by default.")
@@ -128,12 +134,23 @@ def sampled_command(
 
     Of these, control is what the computer asks for, and saturated_control what the actuator gives out.
     """
+    import numpy as np
+    import pandas as pd
+
+    from data.thesis import model_named
+    from design.design_file import read_design
+    from experiments.asked_reference import reference_of
+    from experiments.drive.sampled_loop import Drive, simulate_sampled
+    from experiments.runs.guarantee import guarantee
+    from experiments.runs.sector_promise import steady_control, verdict
+
     positive_limit(limit)
     drive = Drive(rate, method, (-limit, limit), quantum, slew, input_delay)
     _require_few_rows(until * rate)
     content = read_design(design)
-    kind = _compensator(content, anti_windup, {})
-    asked, true = reference_of(content, **reference), _true_plant(plant)
+    kind = None if anti_windup == "none" else content.compensator(anti_windup)
+    asked = reference_of(content, **reference)
+    true = None if plant is None else model_named(plant).plant
     run = simulate_sampled(content, asked, kind, drive, until, true)
     beyond = run.time_s[np.abs(run.control) > limit]
     last = f", the last at {beyond[-1]:.6g} s" if len(beyond) else ""
@@ -156,19 +173,6 @@ def _first(promised: str, said: str) -> str:
 def _require_few_rows(rows: float) -> None:
     if rows > MOST_ROWS:
         raise InputError(f"{rows:.3g} rows are asked for; expected at most {MOST_ROWS:.3g}")
-
-
-def _compensator(design: Design, name: str, numbers: Mapping[str, float | None]) -> AntiWindup | None:
-    given = {key: value for key, value in numbers.items() if value is not None}
-    if given and name != "thesis":
-        raise InputError(f"--{next(iter(given))} belongs to --anti-windup thesis; found --anti-windup {name}")
-    if given:
-        return printed_form({**design.anti_windup["thesis"], **given})
-    return None if name == "none" else design.compensator(name)
-
-
-def _true_plant(plant: str | None) -> PlantModel | None:
-    return None if plant is None else model_named(plant).plant
 
 
 def _inputs(design: Path, plant: str | None, reference: Path | None) -> list[Path]:

@@ -6,11 +6,13 @@ import csv
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from identification.base.errors import InputError
 from identification.base.files import read_text, write_whole
+
+if TYPE_CHECKING:  # a command line need not wait for it
+    import pandas as pd
 
 
 def write_tables(tables: Mapping[Path, pd.DataFrame], inputs: Iterable[Path] = ()) -> None:
@@ -39,6 +41,8 @@ def read_cells(path: Path, columns: Sequence[str]) -> pd.DataFrame:
     InputError
         The file cannot be read, has other columns or no rows, or a row has more or fewer cells.
     """
+    import pandas as pd
+
     reader = csv.reader(StringIO(read_text(path), newline=""), strict=True)
     rows: list[list[str]] = []
     try:

@@ -1,29 +1,17 @@
-"""The command line of this room: python -m identification fit SWEEP... --output model.json."""
+"""The command line of this room: python -m identification fit SWEEP... --output model.json.
+
+The command imports what it runs, so that a command line answers at once.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import click
-import matplotlib.style
-from tqdm import tqdm
 
 from identification.base.command_line import CommandGroup
-from identification.base.errors import InputError
 from identification.base.files import write_whole
-from identification.bound.bound_residuals import HIGHEST_ORDER, bound_residuals
-from identification.fitting.fit_plant import fit_plant
-from identification.fitting.subspace_check import SubspaceCheck, check_modes
-from identification.model.model_file import IdentifiedModel
-from identification.model.plant import PlantModel
-from identification.model.structure import Wanted
-from identification.output.fit_facts import bound_remarks, bound_text, check_lines, facts, standard_errors, table
-from identification.output.plots import draw_fit
-from identification.sweeps.read_sweeps import input_files, read_sweeps
-from identification.sweeps.response import FrequencyResponse, alias_free
-
-FIGURES = (".pdf", ".svg", ".png")
+from identification.model.plant import HIGHEST_ORDER
 
 
 class Counts(click.ParamType):
@@ -79,7 +67,6 @@ def main() -> None:
     help="Of W_a; 2 is Eq. (2.22).",
 )
 @click.option("--seed", default=0, type=click.IntRange(min=0), show_default=True, help="Of the random restarts.")
-@click.option("--figure", type=click.Path(path_type=Path), help="Draw the fit; .pdf, .svg or .png.")
 def fit(
     sweeps: tuple[Path, ...],
     output: Path,
@@ -89,42 +76,24 @@ def fit(
     loss: str,
     bound_order: int,
     seed: int,
-    figure: Path | None,
 ) -> None:
     """Fit gain, integrators, modes, real roots and dead time to SWEEP files (raw records or frequency responses)."""
-    if figure is not None and figure.suffix not in FIGURES:
-        raise InputError(f"{figure}: the suffix is '{figure.suffix}'; expected {', '.join(FIGURES)}")
-    if figure == output:
-        raise InputError(f"{figure}: given as --output and as --figure; expected two files")
+    from tqdm import tqdm
+
+    from identification.fit_model import fit_model
+    from identification.model.structure import Wanted
+    from identification.output.fit_facts import bound_remarks, bound_text, check_lines, table
+    from identification.sweeps.read_sweeps import input_files, read_sweeps
+
     tests = read_sweeps(sweeps)
     with tqdm(desc="fits", unit="", disable=None, leave=False) as bar:
         wanted = Wanted(None if integrators == "auto" else int(integrators), modes, real)
-        result = fit_plant(tests, wanted, soft=loss == "soft-l1", seed=seed, tick=bar.update)
-        checks = _checks(tests, [test.plant for test in result.tests], bar.update)
-    clean = [alias_free(test, result.plant) for test in tests]
-    report = bound_residuals(result.plant, clean, [test.plant for test in result.tests], bound_order)
-    model = IdentifiedModel(result.plant, report.bound, standard_errors(result), facts(tests, result, report, checks))
-    text = model.to_json()
-    writers: dict[Path, Callable[[Path], object]] = {output: lambda path: path.write_text(text, encoding="utf-8")}
-    with matplotlib.style.context(["default", {"svg.hashsalt": "identification", "font.size": 9}]):
-        if figure is not None:
-            drawing = draw_fit(clean, result.plant, report.bound)
-            dateless = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}, ".png": {}}[figure.suffix]
-            writers[figure] = lambda path: drawing.savefig(path, dpi=300, metadata=dateless)
-        write_whole(writers, inputs=input_files(sweeps))
-    click.echo("\n".join([table(result), bound_text(report.bound), *bound_remarks(report), *check_lines(checks)]))
-
-
-def _checks(
-    tests: list[FrequencyResponse], plants: list[PlantModel], tick: Callable[[], object]
-) -> dict[str, SubspaceCheck]:
-    """By its name, the subspace check of each test that was read from a raw record against its own fit."""
-    checks = {}
-    for test, plant in zip(tests, plants, strict=True):
-        if test.record is not None:
-            checks[test.name] = check_modes(plant, test.record, (float(test.omega[0]), float(test.omega[-1])))
-            tick()
-    return checks
+        soft = loss == "soft-l1"
+        fitted = fit_model(tests, wanted, soft=soft, bound_order=bound_order, seed=seed, tick=bar.update)
+    text = fitted.model.to_json()
+    write_whole({output: lambda path: path.write_text(text, encoding="utf-8")}, inputs=input_files(sweeps))
+    bound = [bound_text(fitted.model.additive_bound), *bound_remarks(fitted.bound_fit)]
+    click.echo("\n".join([table(fitted.plant_fit), *bound, *check_lines(fitted.checks)]))
 
 
 if __name__ == "__main__":

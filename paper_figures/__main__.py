@@ -1,4 +1,7 @@
-"""The command line of the figures: ``python -m paper_figures`` with draw, summary and report."""
+"""The command line of the figures: ``python -m paper_figures`` with draw, summary and report.
+
+Each command imports what it runs, so that a command line answers at once, and make knows what each command hangs on.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,6 @@ from pathlib import Path
 import click
 
 from identification.base.command_line import CommandGroup
-from paper_figures.look import style
-from paper_figures.summary.build_folder import missing_columns_named, read_build, read_table, summaries
-from paper_figures.thesis.figure_registry import figure_module, figure_names
 
 
 @click.group(cls=CommandGroup)
@@ -28,6 +28,10 @@ def main() -> None:
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="Existing folder to write to.")
 def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
     """Draw the figures NAME..., such as fig_2_01, each as PDF, SVG and PNG with its caption as text."""
+    from paper_figures.look import style
+    from paper_figures.result_tables import missing_columns_named, read_table
+    from paper_figures.thesis.figure_registry import figure_module
+
     drawn = {}
     for name in names:
         module = figure_module(name)
@@ -49,11 +53,13 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
 )
 def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
     """Sum up MODEL, fitted to SWEEP files, its designs, and what was refused: summary.pdf, .svg, .png and .txt."""
-    # only here: they take a second to import, and no figure needs them
     from identification.model.model_file import read_model
     from identification.sweeps.read_sweeps import read_sweeps
     from identification.sweeps.response import alias_free
+    from paper_figures.look import style
+    from paper_figures.result_tables import missing_columns_named
     from paper_figures.summary import page
+    from paper_figures.summary.build_folder import read_build, summaries
     from paper_figures.summary.words import summarise
 
     identified = read_model(model)
@@ -68,6 +74,23 @@ def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
         click.echo(f"{head}: {sentence}")
 
 
+@main.command("bode")
+@click.argument("model", type=click.Path(path_type=Path, dir_okay=False))
+@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--output", type=click.Path(path_type=Path), required=True, help="Existing folder to write to.")
+def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
+    """Draw SWEEP files, MODEL and the distances under W_a: bode.pdf, .svg and .png, with a caption in bode.txt."""
+    from identification.model.model_file import read_model
+    from identification.sweeps.read_sweeps import read_sweeps
+    from paper_figures.look.bode import plot_bode
+    from paper_figures.look.style import save
+
+    identified, tests = read_model(model), read_sweeps(sweeps)
+    names = ", ".join(test.name + (" (synthetic)" if test.synthetic else "") for test in tests)
+    caption = f"Magnitude and phase of {names} and of the model {model.name}, and their distance under the bound W_a."
+    save(plot_bode(identified, tests), output, "bode", caption)
+
+
 @main.command("report")
 @click.argument("model")
 @click.argument("sweeps", metavar="[SWEEP]...", nargs=-1, type=click.Path(path_type=Path))
@@ -79,7 +102,9 @@ def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
 )
 def report_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
     """Put all that was made for MODEL (a model.json, table or implied) and SWEEP files on one page of HTML."""
-    # only here, as above
+    from paper_figures.result_tables import missing_columns_named
+    from paper_figures.summary.build_folder import read_build, summaries
+    from paper_figures.thesis.figure_registry import figure_module, figure_names
     from paper_figures.thesis.report.content import report_content
     from paper_figures.thesis.report.html import write_report
     from paper_figures.thesis.report.inputs import read_inputs

@@ -13,10 +13,9 @@ from design.anti_windup.corrected_compensator import SETTLED, corrected
 from design.anti_windup.popov import popov_sector, robust_loss, robust_popov_sector
 from design.anti_windup.thesis_compensator import thesis_choice
 from design.blocks.block import Block, bound_block, fastest_root, plant_block
+from design.choices import SECTOR
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
-
-SECTOR = 0.95  # of the corrected compensator unless another is stated: |u| may reach twenty times the limits
 
 
 @dataclass(frozen=True)

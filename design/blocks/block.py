@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,10 @@ from identification.base.arrays import Complex
 from identification.base.errors import InputError
 from identification.model.model_file import number
 from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.python_control import from_control, to_control
+
+if TYPE_CHECKING:
+    from control import TransferFunction
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,15 @@ class Block:
     def is_stable(self) -> bool:
         """Whether every pole lies in the open left half plane: of a proper block, Thesis Definition 2.1.1."""
         return not self.unstable_poles
+
+    def to_control(self, pade_order: int = 0) -> TransferFunction:
+        """The block as python-control's transfer function, :func:`identification.model.python_control.to_control`."""
+        return to_control(self.gain, self.zeros, self.poles, self.delay_s, pade_order, "block")
+
+    @classmethod
+    def from_control(cls, system: object, delay_s: float = 0.0) -> Block:
+        """The block of a python-control system, :func:`identification.model.python_control.from_control`."""
+        return cls(*from_control(system), delay_s)
 
     def to_dict(self) -> dict[str, Any]:
         """The block as design.json holds it."""

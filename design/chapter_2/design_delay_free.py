@@ -8,9 +8,10 @@ import numpy as np
 
 from design.anti_windup.compensator import printed_form
 from design.anti_windup.corrected_compensator import SETTLED
-from design.anti_windup.judge import SECTOR, compensators
+from design.anti_windup.judge import compensators
 from design.blocks.block import Block, bound_block, plant_denominator, plant_numerator, require_thesis_class
 from design.chapter_2.internal_model import InternalModel, internal_model, reference_polynomial
+from design.choices import SECTOR
 from design.design_file import Design
 from design.hinf.mixed_sensitivity import mixed_sensitivity
 from design.hinf.pick import Problem

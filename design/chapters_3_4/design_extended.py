@@ -9,16 +9,15 @@ import numpy as np
 
 from design.anti_windup.compensator import printed_form
 from design.anti_windup.corrected_compensator import SETTLED
-from design.anti_windup.judge import SECTOR, compensators
+from design.anti_windup.judge import compensators
 from design.blocks.block import Block, plant_block, plant_denominator, plant_numerator
 from design.chapters_3_4.interpolate_Q import StableFunction, by_poles, by_zeros, conditions, lagrange
 from design.chapters_3_4.robust_roll_off import robust_free_part
 from design.chapters_3_4.smith_predictor import free_part, stabiliser
+from design.choices import SECTOR
 from design.design_file import Design
 from identification.base.errors import InputError
 from identification.model.model_file import IdentifiedModel
-
-METHODS = ("zeros", "lagrange", "poles")
 
 
 def design_extended(
@@ -49,7 +48,7 @@ def design_extended(
     pairs
         e and f of the denominator of Q, a pair for each frequency above 0, when ``method`` is "zeros".
     method
-        How Q is designed, one of :data:`METHODS`; the results of all three are kept in ``parameters``.
+        How Q is designed, one of :data:`design.choices.METHODS`; the results of all three are kept in ``parameters``.
     inverse_epsilon
         epsilon of the approximate inverse of (3.2) in seconds; 0 is the exact one.
     robust_level

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,12 +14,15 @@ from experiments.engine.compiled_loop import BRIEF, CompiledLoop, compile_loop
 from experiments.engine.saturated_loop import SaturatedLoop
 from identification.base.errors import InputError
 
+if TYPE_CHECKING:
+    from control import TimeResponseData
+
 MOST_STEPS = 2e7  # a few minutes
 MOST_ROOM = 1e8  # numbers, a gigabyte
 TAIL = 1e-11  # of a polynomial's terms, see integrate
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run:
     """A simulated run at the sample times.
 
@@ -41,6 +45,23 @@ class Run:
     outputs: Mapping[str, np.ndarray]
     events_s: np.ndarray
     modes: np.ndarray
+
+    def __repr__(self) -> str:
+        names, end = ", ".join(self.outputs), self.time_s[-1]
+        return f"Run({self.time_s.size} samples up to {end:.6g} s, {self.events_s.size} crossings, outputs {names})"
+
+    def to_control(self) -> TimeResponseData:
+        """The run as python-control's time response: the outputs by their names, and the input sat(u)."""
+        from control import TimeResponseData
+
+        return TimeResponseData(
+            self.time_s,
+            np.array(list(self.outputs.values())),
+            inputs=self.saturated_control,
+            output_labels=list(self.outputs),
+            input_labels=["saturated_control"],
+            issiso=False,
+        )
 
 
 class DivergenceError(InputError):

@@ -1,6 +1,6 @@
 """The group ``thesis``: one command for each of the thesis's experiments, under its references and limits.
 
-What takes long to import, and only one command needs, that command imports.
+Each command imports what it runs, as in :mod:`experiments.__main__`.
 """
 
 from __future__ import annotations
@@ -8,15 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-from tqdm import tqdm
 
-from data.thesis import model_named
-from design.design_file import Design, read_design
-from experiments.campaign.command import plant_options, run_campaign
+from experiments.campaign.command import plant_options
 from experiments.options import DESIGN, OUTPUT_FOLDER, positive_limit
 from experiments.tables import write_into
 from experiments.thesis.claims.commands import claims_command, coverage_command, equations_command
-from experiments.thesis.printed_choices import thesis_reference
 from identification.base.errors import InputError
 
 LIMIT = click.option("--limit", type=float, help="Saturation limits +-LIMIT, instead of the thesis's.")
@@ -46,6 +42,7 @@ def pid(output: Path) -> None:
 @OUTPUT_FOLDER
 def f_gamma(design: Path, output: Path) -> None:
     """The parameter study of f(gamma) for the bound of DESIGN: f_gamma.csv, f_gamma_summary.csv."""
+    from design.design_file import read_design
     from experiments.thesis.studies.f_gamma import f_gamma_tables
 
     write_into(output, f_gamma_tables(read_design(design).additive_bound))
@@ -56,6 +53,9 @@ def f_gamma(design: Path, output: Path) -> None:
 @OUTPUT_FOLDER
 def trade_off(design: Path, output: Path) -> None:
     """f of the corrected anti-windup over recovery time and sector: trade_off.csv, trade_off_summary.csv."""
+    from tqdm import tqdm
+
+    from design.design_file import read_design
     from experiments.thesis.studies.trade_off import RECOVERIES, SECTORS, trade_off_tables
 
     content = read_design(design)
@@ -68,9 +68,10 @@ def trade_off(design: Path, output: Path) -> None:
 @OUTPUT_FOLDER
 def interpolation(design: Path, output: Path) -> None:
     """Where each design of Q works: interpolation.csv, interpolation_map.csv, interpolation_summary.csv."""
+    from design.design_file import read_design
     from experiments.thesis.studies.interpolation import interpolation_tables
 
-    write_into(output, interpolation_tables(_of_kind(design, "extended")))
+    write_into(output, interpolation_tables(read_design(design, "extended")))
 
 
 @thesis.command("robustness")
@@ -78,6 +79,7 @@ def interpolation(design: Path, output: Path) -> None:
 @OUTPUT_FOLDER
 def robustness(designs: tuple[Path, ...], output: Path) -> None:
     """|W_a C S| and the margins of each DESIGN, named by its file: robustness.csv, robustness_summary.csv."""
+    from design.design_file import read_design
     from experiments.thesis.studies.robustness import robustness_tables
 
     names = [path.stem for path in designs]
@@ -92,9 +94,10 @@ def robustness(designs: tuple[Path, ...], output: Path) -> None:
 @OUTPUT_FOLDER
 def delay_free(design: Path, limit: float | None, output: Path) -> None:
     """The chapter 2 loop: delay_free.csv, delay_free_summary.csv."""
+    from design.design_file import read_design
     from experiments.thesis.studies.chapter_2 import delay_free_tables
 
-    write_into(output, delay_free_tables(_of_kind(design, "delay-free"), positive_limit(limit)))
+    write_into(output, delay_free_tables(read_design(design, "delay-free"), positive_limit(limit)))
 
 
 @thesis.command("extended")
@@ -103,9 +106,10 @@ def delay_free(design: Path, limit: float | None, output: Path) -> None:
 @OUTPUT_FOLDER
 def extended(design: Path, limit: float | None, output: Path) -> None:
     """The chapter 4 loop: extended.csv, extended_summary.csv."""
+    from design.design_file import read_design
     from experiments.thesis.studies.chapter_4 import extended_tables
 
-    write_into(output, extended_tables(_of_kind(design, "extended"), positive_limit(limit)))
+    write_into(output, extended_tables(read_design(design, "extended"), positive_limit(limit)))
 
 
 @thesis.command("limits")
@@ -113,7 +117,11 @@ def extended(design: Path, limit: float | None, output: Path) -> None:
 @OUTPUT_FOLDER
 def limits(design: Path, output: Path) -> None:
     """What no controller of DESIGN's plant can better: limits_KIND.csv, limits_KIND_summary.csv."""
+    from tqdm import tqdm
+
+    from design.design_file import read_design
     from experiments.physical_limits.least_peak_error import limits_tables
+    from experiments.thesis.printed_choices import thesis_reference
     from experiments.thesis.studies.conditions import several_limits
 
     content = read_design(design)
@@ -126,6 +134,8 @@ def limits(design: Path, output: Path) -> None:
 @OUTPUT_FOLDER
 def conditions(output: Path) -> None:
     """What the thesis does not print, searched by what it does: conditions.csv, conditions_summary.csv."""
+    from tqdm import tqdm
+
     from experiments.thesis.unprinted.search import conditions_tables
 
     if not output.is_dir():
@@ -140,9 +150,10 @@ def conditions(output: Path) -> None:
 @OUTPUT_FOLDER
 def sampled_rates(design: Path, limit: float | None, output: Path) -> None:
     """The chapter 4 loop on a computer with a real drive, over its rate: sampled.csv, sampled_summary.csv."""
+    from design.design_file import read_design
     from experiments.thesis.studies.sampled_rates import sampled_rates_tables
 
-    write_into(output, sampled_rates_tables(_of_kind(design, "extended"), positive_limit(limit)))
+    write_into(output, sampled_rates_tables(read_design(design, "extended"), positive_limit(limit)))
 
 
 @thesis.command("campaign")
@@ -150,6 +161,9 @@ def sampled_rates(design: Path, limit: float | None, output: Path) -> None:
 @LIMIT
 def campaign(design: Path, plants: int, seed: int, scheduler: str | None, output: Path, limit: float | None) -> None:
     """Run DESIGN with plants drawn inside W_a, as the command campaign does."""
+    from design.design_file import read_design
+    from experiments.campaign.run_campaign import run_campaign
+    from experiments.thesis.printed_choices import thesis_reference
     from experiments.thesis.studies.conditions import usual_limit, usual_periods
 
     content = read_design(design)
@@ -165,14 +179,8 @@ def campaign(design: Path, plants: int, seed: int, scheduler: str | None, output
 @OUTPUT_FOLDER
 def additive_error(model: str, sweeps: tuple[Path, ...], output: Path) -> None:
     """The additive error of SWEEPS against MODEL: additive_error.csv, additive_error_summary.csv."""
+    from data.thesis import model_named
     from experiments.thesis.studies.additive_error import additive_error_tables
     from identification.sweeps.read_sweeps import read_sweeps
 
     write_into(output, additive_error_tables(model_named(model), read_sweeps(sweeps)))
-
-
-def _of_kind(path: Path, kind: str) -> Design:
-    design = read_design(path)
-    if design.kind != kind:
-        raise InputError(f"{path}: kind is '{design.kind}'; expected '{kind}'")
-    return design

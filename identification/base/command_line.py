@@ -11,6 +11,8 @@ import numpy as np
 
 from identification.base.errors import InputError
 
+EXTRAS = {"dask": "campaign", "distributed": "campaign", "pyarrow": "campaign"}  # of pyproject.toml, by their modules
+
 
 class Refusal(click.ClickException):
     """How a command line shows an :class:`InputError`."""
@@ -22,7 +24,7 @@ class CommandGroup(click.Group):
     """A click group whose commands answer an :class:`InputError` with its sentence and exit status 2.
 
     So they do when finite numbers lead out of what floating point can hold: an overflow, a singular matrix, an
-    array larger than the memory.
+    array larger than the memory; and where a module of an extra is not installed.
     """
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -34,3 +36,8 @@ class CommandGroup(click.Group):
             raise Refusal(str(error)) from None
         except (ArithmeticError, np.linalg.LinAlgError, MemoryError) as error:
             raise Refusal(f"the numbers given are too extreme to compute with ({error})") from None
+        except ModuleNotFoundError as error:
+            if error.name not in EXTRAS:
+                raise
+            extra = f'pip install "antiwindup-thesis[{EXTRAS[error.name]}]"'
+            raise Refusal(f"{error.name} is not installed, which this command needs; give {extra}") from None

@@ -12,10 +12,9 @@ from identification.base.arrays import Real
 from identification.base.errors import InputError
 from identification.bound.envelope import WIDTH, envelope_of
 from identification.bound.tightest_bound import Points, resonances, shares, tightest
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.plant import HIGHEST_ORDER, AdditiveBound, PlantModel
 from identification.sweeps.response import FrequencyResponse
 
-HIGHEST_ORDER = 8
 GRID = 1000  # frequencies, equal in logarithm, that are looked at besides the lines
 ROUNDING = 1e-12  # of the plant: two models that differ by less do not differ
 MARGIN = 1e-9  # relative, so that rounding cannot uncover the line where the bound touches

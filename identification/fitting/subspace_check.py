@@ -6,10 +6,10 @@ import contextlib
 import io
 import warnings
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
-import sippy_unipi
 from numpy.typing import ArrayLike
 from scipy.linalg import eigvals
 from scipy.signal import resample_poly
@@ -102,7 +102,7 @@ def check_modes(plant: PlantModel, record: Record, band_omega: tuple[float, floa
     Returns
     -------
     SubspaceCheck
-        Whatever happens: where the method fails, the reason.
+        Whatever happens: where the method fails or is not installed, the reason.
 
     Notes
     -----
@@ -130,6 +130,8 @@ def check_modes(plant: PlantModel, record: Record, band_omega: tuple[float, floa
         return SubspaceCheck(order, sampling_s, (), f"more than {LARGEST_ORDER} states")
     if not 10 * horizon < samples <= LONGEST:
         return SubspaceCheck(order, sampling_s, (), f"{samples} samples; expected {10 * horizon} to {LONGEST}")
+    if find_spec("sippy_unipi") is None:
+        return SubspaceCheck(order, sampling_s, (), 'sippy-unipi is missing; pip install "antiwindup-thesis[check]"')
     try:
         with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
@@ -155,6 +157,8 @@ def _prepared(x: Real, factor: int, differences: int) -> Real:
 
 def _state_space(u: Real, y: Real, order: int, horizon: int) -> tuple[Real, Real, Real, Real]:
     """A, B, C, D by sippy, which takes Python integers only."""
+    import sippy_unipi  # more than a second, and only raw records need it
+
     model = sippy_unipi.system_identification(
         y, u, "N4SID", SS_fixed_order=int(order), SS_f=int(horizon), SS_p=int(horizon), SS_D_required=True
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +34,8 @@ class IdentifiedModel:
 
     plant: PlantModel
     additive_bound: AdditiveBound
-    standard_errors: Mapping[str, Any] | None
-    fit: Mapping[str, Any]
+    standard_errors: Mapping[str, Any] | None = None
+    fit: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> str:
         """The text of model.json; every number is finite or this raises ValueError."""

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.base.arrays import Complex
 from identification.base.errors import InputError
+from identification.model.python_control import from_control, to_control
+
+if TYPE_CHECKING:
+    from control import TransferFunction
+
+HIGHEST_ORDER = 8
+"""Most poles of an additive bound that is fitted."""
 
 
 def _finite(**numbers: float) -> None:
@@ -121,6 +130,27 @@ class PlantModel:
         """The delay-free factor G(s) of chapter 2."""
         return replace(self, delay_s=0.0)
 
+    def to_control(self, pade_order: int = 0) -> TransferFunction:
+        """P(s) as python-control's transfer function, see :func:`identification.model.python_control.to_control`."""
+        gain, zeros, poles = _leading(self.gain, self.zero_modes, self.real_zeros, self.pole_modes, self.real_poles)
+        poles += [0j] * self.integrators
+        return to_control(gain, zeros, poles, self.delay_s, pade_order, "P")
+
+    @classmethod
+    def from_control(cls, system: object, delay_s: float = 0.0) -> PlantModel:
+        """The plant of a python-control system and a dead time in seconds.
+
+        Raises
+        ------
+        InputError
+            See :func:`identification.model.python_control.from_control`; or a root lies right of the imaginary axis,
+            or on it but for poles at s = 0.
+        """
+        gain, zeros, poles = from_control(system)
+        left = [pole for pole in poles if pole]
+        K, zero_modes, real_zeros, pole_modes, real_poles = _lowest(gain, zeros, left)
+        return cls(K, zero_modes, pole_modes, delay_s, len(poles) - len(left), real_zeros, real_poles)
+
 
 @dataclass(frozen=True)
 class AdditiveBound:
@@ -192,6 +222,44 @@ class AdditiveBound:
         s = np.asarray(s, dtype=np.complex128)
         shape = _quotient(self.zero_modes, self.real_zeros, self.pole_modes, self.real_poles, s)
         return np.asarray(self.gain * shape)
+
+    def to_control(self) -> TransferFunction:
+        """W_a(s) as python-control's transfer function."""
+        return to_control(
+            *_leading(self.gain, self.zero_modes, self.real_zeros, self.pole_modes, self.real_poles), 0.0, 0, "W_a"
+        )
+
+    @classmethod
+    def from_control(cls, system: object) -> AdditiveBound:
+        """The bound |system|; raises InputError when it is not stable, minimum phase and as above."""
+        gain, zero_modes, real_zeros, pole_modes, real_poles = _lowest(*from_control(system))
+        return cls(abs(gain), zero_modes, pole_modes, real_zeros, real_poles)
+
+
+def _leading(
+    gain: float,
+    zero_modes: tuple[Mode, ...],
+    real_zeros: tuple[float, ...],
+    pole_modes: tuple[Mode, ...],
+    real_poles: tuple[float, ...],
+) -> tuple[float, list[complex], list[complex]]:
+    """Leading coefficient, zeros and poles in rad/s of gain * prod(zeros)/prod(poles), each factor 1 at s = 0."""
+    zeros = [*(root for mode in zero_modes for root in mode.roots), *(complex(-rate) for rate in real_zeros)]
+    poles = [*(root for mode in pole_modes for root in mode.roots), *(complex(-rate) for rate in real_poles)]
+    return float((gain * np.prod(np.negative(poles)) / np.prod(np.negative(zeros))).real), zeros, poles
+
+
+def _lowest(
+    gain: float, zeros: Sequence[complex], poles: Sequence[complex]
+) -> tuple[float, tuple[Mode, ...], tuple[float, ...], tuple[Mode, ...], tuple[float, ...]]:
+    """What :func:`_leading` takes from what it returns; pairs and rates in the order of their frequencies."""
+    low = float((gain * np.prod(np.negative(zeros)) / np.prod(np.negative(poles))).real)
+    modes, rates = [], []
+    for roots in (zeros, poles):
+        pairs = sorted((root for root in roots if root.imag > 0), key=abs)
+        modes.append(tuple(Mode(abs(root), -root.real / abs(root)) for root in pairs))
+        rates.append(tuple(sorted(-root.real for root in roots if root.imag == 0)))
+    return low, modes[0], rates[0], modes[1], rates[1]
 
 
 def _positive_rates(**rates: tuple[float, ...]) -> None:

@@ -1,1 +1,1 @@
-"""Tool: what a fit says and how it looks."""
+"""Tool: what a fit says."""

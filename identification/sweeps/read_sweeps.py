@@ -14,10 +14,9 @@ from identification.formats.csv_file import read_csv
 from identification.formats.mat_file import read_mat
 from identification.formats.uff_file import read_uff
 from identification.sweeps.estimate_response import estimate_response
-from identification.sweeps.response import FrequencyResponse, Record
+from identification.sweeps.response import FEWEST_LINES, FrequencyResponse, Record
 from identification.sweeps.swapped_or_wrong_unit import bends, lead_time, wrap
 
-FEWEST_LINES = 8
 FEWEST_SAMPLES = 128
 JITTER = 0.05  # largest distance of a sample from the uniform grid, in sampling intervals
 CONSTANT = 1e-9  # of a signal's size

@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from identification.base.arrays import Complex, Real
+from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 from identification.model.pulse_response import aliases
 
+if TYPE_CHECKING:
+    from control import FrequencyResponseData
 
-@dataclass(frozen=True)
+FEWEST_LINES = 8
+
+
+@dataclass(frozen=True, repr=False)
 class Record:
     """The raw record of a test.
 
@@ -30,8 +39,12 @@ class Record:
     output: Real
     held: bool
 
+    def __repr__(self) -> str:
+        held = ", held input" if self.held else ""
+        return f"Record({self.input.size} samples at {1 / self.sampling_s:g} Hz{held})"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class FrequencyResponse:
     """One test: the response of the plant at M lines.
 
@@ -64,6 +77,38 @@ class FrequencyResponse:
     synthetic: bool = False
     record: Record | None = None
     path: Path | None = None
+
+    def __repr__(self) -> str:
+        low, high = self.omega[[0, -1]] / (2 * np.pi)
+        synthetic = ", synthetic" if self.synthetic else ""
+        return f"FrequencyResponse('{self.name}', {self.omega.size} lines, {low:.4g} to {high:.4g} Hz{synthetic})"
+
+    def to_control(self) -> FrequencyResponseData:
+        """The response as python-control's frequency response data."""
+        from control import FrequencyResponseData
+
+        return FrequencyResponseData(self.response, self.omega, name=self.name)
+
+    @classmethod
+    def from_control(cls, data: FrequencyResponseData) -> FrequencyResponse:
+        """A test of python-control's frequency response data; its name is the data's.
+
+        Raises
+        ------
+        InputError
+            More than one input or output, fewer than 8 frequencies, a frequency that is not positive or not greater
+            than the one before it, or a number that is not finite.
+        """
+        if not data.issiso():
+            raise InputError(f"the data have {data.ninputs} inputs and {data.noutputs} outputs; expected one of each")
+        omega, response = np.array(data.omega, dtype=float), np.array(data.frdata[0, 0], dtype=complex)
+        if not (np.isfinite(omega).all() and np.isfinite(response).all()):
+            raise InputError("the data are not finite; expected finite frequencies and responses")
+        if len(omega) < FEWEST_LINES or omega[0] <= 0 or np.any(np.diff(omega) <= 0):
+            raise InputError(
+                f"the data have {len(omega)} frequencies; expected {FEWEST_LINES} or more, positive and increasing"
+            )
+        return cls(omega, response, None, data.name)
 
 
 def alias_free(test: FrequencyResponse, plant: PlantModel) -> FrequencyResponse:

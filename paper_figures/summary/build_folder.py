@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from functools import partial
-from io import StringIO
 from pathlib import Path
-from traceback import walk_tb
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import pandas as pd
 
-from identification.base.errors import InputError
+from design.design_file import Design, read_design
 from identification.base.files import read_text
-
-if TYPE_CHECKING:
-    from design.design_file import Design
+from paper_figures.result_tables import read_table
+from paper_figures.summary.of_designs import FOLLOWING
 
 Result = TypeVar("Result")
 
@@ -36,9 +32,6 @@ def read_build(build: Path, figure: str) -> tuple[dict[str, Design | str], dict[
     InputError
         A file is not what it should be.
     """
-    from design.design_file import read_design
-    from paper_figures.summary.of_designs import FOLLOWING
-
     designs = read_attempts({name: build / f"design_{name}" for name in FOLLOWING}, ".json", read_design)
     stems = {name: build / "results" / name for names in FOLLOWING.values() for name in names}
     return designs, read_attempts(stems, "_summary.csv", partial(read_table, figure=figure))
@@ -72,55 +65,6 @@ def read_attempts(stems: Mapping[str, Path], end: str, read: Callable[[Path], Re
         path, refusal = (stem.with_name(stem.name + ending) for ending in (end, ".refused.txt"))
         if path.is_file():
             found[name] = read(path)
-        elif refusal.is_file() and (lines := read_text(refusal).strip().splitlines()):
-            found[name] = lines[-1].removeprefix("Error: ").rstrip(".")
+        elif refusal.is_file() and (sentence := read_text(refusal).strip()):
+            found[name] = sentence.rstrip(".")
     return found
-
-
-def read_table(path: Path, figure: str = "summary") -> pd.DataFrame:
-    """Return a table of results, its ``#`` lines left out.
-
-    Parameters
-    ----------
-    path
-        The CSV file.
-    figure
-        Name of the figure that needs it, for the message.
-
-    Raises
-    ------
-    InputError
-        The file is missing, is no table or has no rows.
-    """
-    if not path.is_file():
-        raise InputError(f"{path}: no such table, which {figure} needs")
-    try:
-        table = pd.read_csv(StringIO(read_text(path)), comment="#")
-    except (pd.errors.ParserError, pd.errors.EmptyDataError):
-        raise InputError(f"{path}: not a table of comma-separated values, which {figure} needs") from None
-    if table.empty:
-        raise InputError(f"{path}: no rows below the names of the columns, which {figure} needs")
-    return table
-
-
-@contextmanager
-def missing_columns_named(tables: Mapping[str, pd.DataFrame], results: Path, figure: str) -> Iterator[None]:
-    """Turn the KeyError of a table that lacks a column into a sentence; every other KeyError goes on.
-
-    Raises
-    ------
-    InputError
-        A column that was asked for is missing from one of the tables, or from rows taken out of one.
-    """
-    try:
-        yield
-    except KeyError as error:
-        column = error.args[0]
-        for frame, _ in walk_tb(error.__traceback__):
-            asked = frame.f_locals.get("self")
-            if not isinstance(asked, pd.DataFrame) or column in asked.columns:
-                continue
-            for name, table in tables.items():
-                if asked.columns.equals(table.columns):
-                    raise InputError(f"{results / name}.csv: no column {column}, which {figure} needs") from None
-        raise

@@ -13,9 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.textpath import text_to_path
 
 from identification.model.model_file import IdentifiedModel
-from identification.output.plots import draw_distance, draw_magnitude, draw_phase, draw_relative_distance
 from identification.sweeps.response import FrequencyResponse
 from paper_figures.look import panels, style
+from paper_figures.look.bode import draw_distance, draw_magnitude, draw_phase, draw_relative_distance
 from paper_figures.summary.of_fit import Paragraph, Table, fact
 from paper_figures.summary.words import Summary
 

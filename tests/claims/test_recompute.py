@@ -1,6 +1,7 @@
 """How a verdict comes about: digits, rounding of the inputs, NaN, and what is refused; and the command line."""
 
 import math
+import re
 from pathlib import Path
 
 import pandas as pd
@@ -10,7 +11,7 @@ from click.testing import CliRunner
 from experiments.__main__ import main
 from experiments.thesis.claims.equations_page import EQUATIONS
 from experiments.thesis.claims.inputs import Inputs, rounded_inputs
-from experiments.thesis.claims.ledger import COLUMNS, LEDGER, read_ledger, recompute
+from experiments.thesis.claims.ledger import COLUMNS, FUNCTION, LEDGER, read_ledger, recompute
 from experiments.thesis.claims.printed_number import PrintedNumber, read_number
 from identification.base.errors import InputError
 
@@ -149,6 +150,22 @@ def test_ledgers_that_are_none_are_refused(lines: list[str], part: str, tmp_path
     with pytest.raises(InputError) as refused:
         read_ledger(path)
     assert part in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "named"),
+    [
+        (THETA2, True),
+        ("experiments.runs:peak", True),
+        ("experiments:peak", False),
+        ("experiments.runs.:peak", False),
+        ("experiments.runs:", False),
+        ("design.blocks.ball:peak", False),
+        ("experiments/runs:peak", False),
+    ],
+)
+def test_compute_names_a_function_of_a_module_of_this_room(name: str, named: bool):
+    assert bool(re.fullmatch(FUNCTION, name)) == named
 
 
 @pytest.mark.parametrize(

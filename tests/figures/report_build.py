@@ -46,7 +46,7 @@ def make_build(build: Path) -> None:
         result = invoke(command, *arguments)
         assert result.exit_code == 0, result.output
     for name in ("delay_free", "robust"):
-        (build / f"design_{name}.refused.txt").write_text(f"Error: {REFUSAL}.\n", encoding="utf-8")
+        (build / f"design_{name}.refused.txt").write_text(f"{REFUSAL}.\n", encoding="utf-8")
     table = results / "f_gamma_summary.csv"
     table.write_bytes(BREAKING_OUT.encode() + table.read_bytes())
     made_up_ledger().to_csv(build / "claims.csv", index=False)

@@ -314,7 +314,7 @@ def test_an_experiment_that_was_refused_takes_its_figure_with_it(build: Path, tm
     copy = shutil.copytree(build, tmp_path / "build")
     for path in [*copy.glob("results/f_gamma*"), *copy.glob("figures/fig_2_1[01].*")]:
         path.unlink()
-    (copy / "results" / "f_gamma.refused.txt").write_text(f"Error: {copy}/model.json: no good.\n")
+    (copy / "results" / "f_gamma.refused.txt").write_text(f"{copy}/model.json: no good.\n")
     result = report(copy, *SWEEPS)
     assert result.exit_code == 0, result.output
     text = words(Page((copy / "report" / "index.html").read_text(encoding="utf-8")).text)

@@ -342,8 +342,7 @@ def build(tmp_path: Path) -> Path:
     (tmp_path / "day_0.csv").write_text("omega,real,imag\n" + "\n".join(rows) + "\n", encoding="utf-8")
     (tmp_path / "model.json").write_text(model_of(plant, [test]).to_json(), encoding="utf-8")
     (tmp_path / "results").mkdir()
-    refusal = f"Usage: design ...\n\nError: {NO_INTEGRATOR}.\n"
-    (tmp_path / "design_delay_free.refused.txt").write_text(refusal, encoding="utf-8")
+    (tmp_path / "design_delay_free.refused.txt").write_text(f"{NO_INTEGRATOR}.\n", encoding="utf-8")
     (tmp_path / "design_extended.refused.txt").touch()
     return tmp_path
 

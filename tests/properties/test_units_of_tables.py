@@ -19,6 +19,7 @@ from design.anti_windup.compensator import AntiWindup
 from design.design_file import Design
 from experiments.campaign.draw_plants import PlantsWithin
 from experiments.campaign.run_plants import Campaign, code_sha256, run_chunk
+from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies import f_gamma, interpolation, trade_off
 from experiments.thesis.studies.additive_error import additive_error_tables
 from experiments.thesis.studies.chapter_2 import delay_free_tables
@@ -110,11 +111,13 @@ def test_sampled_rates(small_designs: dict[str, Design], units: Units) -> None:
 @pytest.mark.parametrize("kind", ["extended", "delay-free"])
 @pytest.mark.parametrize("units", TIMES_AND_INPUTS[:2], ids=str)
 def test_a_campaign(small_designs: dict[str, Design], kind: str, units: Units) -> None:
-    own, code = small_designs[kind], code_sha256()
-    found, expected = (
-        pd.DataFrame(run_chunk(Campaign(each.design(own), str(each), 1, LIMIT * abs(each.input), code), 0, 2))
-        for each in (units, Units())
-    )
+    def rows(each: Units) -> pd.DataFrame:
+        design = each.design(small_designs[kind])
+        reference = thesis_reference(kind, design.reference_omegas)
+        campaign = Campaign(design, str(each), 1, reference, LIMIT * abs(each.input), 5, code_sha256())
+        return pd.DataFrame(run_chunk(campaign, 0, 2))
+
+    found, expected = rows(units), rows(Units())
     assert list(found.pop("plant")) == list(expected.pop("plant")) == [0, 0, 0, 1, 1, 1]
     same_tables({"": found}, {"": expected}, units, 1e-9)
 

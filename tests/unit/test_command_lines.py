@@ -131,8 +131,9 @@ def test_design_refuses_a_missing_folder(runner: CliRunner, tmp_path: Path) -> N
     refused(result, "cannot be written")
 
 
+SINUSOID = ["--amplitude", "50", "--phase", "1"]
 APPENDIX = ["trade-off", "interpolation", "robustness", "limits", "sampled-rates"]
-SIMULATE = ["--limit", "12", "--anti-windup", "thesis", "--until", "1", "--sample-time", "0.01", "--amplitude", "50"]
+SIMULATE = ["--limit", "12", "--anti-windup", "thesis", "--until", "1", "--sample-time", "0.01", *SINUSOID]
 
 
 def test_simulate_writes_what_it_promises(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
@@ -144,7 +145,7 @@ def test_simulate_writes_what_it_promises(runner: CliRunner, tmp_path: Path, ext
     assert len(table) == 101
     np.testing.assert_allclose(table["error"], table["reference"] - table["output"], atol=1e-9)
     np.testing.assert_allclose(table["saturated_control"], table["control"].clip(-12, 12), atol=1e-9)
-    np.testing.assert_allclose(table["reference"], 50 * np.sin(1.5 * table["time_s"] + np.pi / 2), atol=1e-9)
+    np.testing.assert_allclose(table["reference"], 50 * np.sin(1.5 * table["time_s"] + 1), atol=1e-9)
 
 
 def test_simulate_takes_a_theta1_of_the_design_and_several_amplitudes(
@@ -156,17 +157,19 @@ def test_simulate_takes_a_theta1_of_the_design_and_several_amplitudes(
     path, output = tmp_path / "mine.json", tmp_path / "run.csv"
     path.write_text(mine.to_json(), encoding="utf-8")
     arguments = ["simulate", str(path), *SIMULATE, "--anti-windup", "mine", "--output", str(output)]
-    arguments += ["--amplitude", "20", "--amplitude", "5", "--phase", "0", "--phase", "1"]
+    arguments += ["--amplitude", "5", "--phase", "0"]
     result = runner.invoke(experiments_main, arguments)
     assert result.exit_code == 0, result.output
     table = pd.read_csv(output)
     t = table["time_s"]
-    np.testing.assert_allclose(table["reference"], 20 * np.sin(1.5 * t) + 5 * np.sin(3 * t + 1), atol=1e-9)
+    np.testing.assert_allclose(table["reference"], 50 * np.sin(1.5 * t + 1) + 5 * np.sin(3 * t), atol=1e-9)
     output.unlink()
     refused(
         runner.invoke(experiments_main, [*arguments, "--amplitude", "1"]), "2 frequencies, 3 amplitudes and 2 phases"
     )
     refused(runner.invoke(experiments_main, [*arguments, "--anti-windup", "his"]), "no anti-windup 'his'", "mine")
+    silent = ["simulate", str(path), *SIMULATE[: -len(SINUSOID)], "--output", str(output)]
+    refused(runner.invoke(experiments_main, silent), "no --amplitude is given", "1.5, 3 rad/s")
     assert not output.exists()
 
 
@@ -194,7 +197,7 @@ def test_simulate_takes_another_true_plant(runner: CliRunner, tmp_path: Path, ex
 
 def test_simulate_stops_at_until(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
     output = tmp_path / "run.csv"
-    arguments = ["--limit", "12", "--anti-windup", "none", "--until", "1", "--sample-time", "0.6"]
+    arguments = ["--limit", "12", "--anti-windup", "none", "--until", "1", "--sample-time", "0.6", *SINUSOID]
     assert (
         runner.invoke(experiments_main, ["simulate", str(extended_json), *arguments, "--output", str(output)]).exit_code
         == 0
@@ -313,6 +316,7 @@ def test_a_run_of_too_many_steps_or_rows_is_refused(runner: CliRunner, tmp_path:
         "12",
         "--anti-windup",
         "none",
+        *SINUSOID,
         "--output",
         str(tmp_path / "r"),
     ]

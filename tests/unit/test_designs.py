@@ -11,7 +11,7 @@ import pytest
 from design.blocks.block import Block, plant_block, plant_denominator, plant_numerator
 from design.chapter_2.design_delay_free import design_delay_free
 from design.chapter_2.internal_model import internal_model
-from design.chapters_3_4.design_extended import METHODS, design_extended
+from design.chapters_3_4.design_extended import design_extended
 from design.chapters_3_4.interpolate_Q import StableFunction, by_poles, by_zeros, conditions, lagrange
 from design.chapters_3_4.smith_predictor import (
     anti_windup_controller,
@@ -21,6 +21,7 @@ from design.chapters_3_4.smith_predictor import (
     smith_controller,
     stabiliser,
 )
+from design.choices import METHODS
 from design.design_file import Design, read_design
 from design.stability.coprime import controller, coprime_factors
 from identification.base.errors import InputError

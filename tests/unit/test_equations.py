@@ -222,7 +222,7 @@ def test_2_4_to_2_6_the_internal_model(seed: int) -> None:
 
 
 def test_remark_1_the_weights_hold_the_reference_and_the_uncertainty(delay_free_design: Design) -> None:
-    """W_1 has the roots of Lambda, moved left by twice the decay rate; |W_2| is |W_a/G|, a bound on |Delta_m|."""
+    """W_1 has the roots of Lambda, moved left by twice the decay rate; |W_2| of stabiliser_problem is |W_a/G|."""
     design = delay_free_design
     assert design.hinf is not None
     W_1, W_2, rate = (design.hinf[name] for name in ("W1", "W2", "decay_rate"))
@@ -394,7 +394,7 @@ def test_2_16_what_saturation_leaves_and_what_the_dead_zone_takes(limits: tuple[
 
 @each
 def test_2_17_and_2_18_theta_1_and_theta_2(chapter: Design, seed: int) -> None:
-    """Of a design of either chapter: theta_1 = theta1~ (1 + F), theta_2 = G (1 + theta_1/(1 + F)) = G (1 + theta1~)."""
+    """Of design_delay_free and design_extended: theta_1 = theta1~ (1 + F), theta_2 = G (1 + theta1~)."""
     s = points(np.random.default_rng(seed))
     theta1_tilde, F = chapter.blocks["theta1_tilde"](s), chapter.blocks["F1"](s) * chapter.blocks["F2"](s)
     chosen = chapter.anti_windup["thesis"]

@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 from identification.__main__ import main
 from identification.model.model_file import read_model
 from identification.model.plant import Mode, PlantModel
+from paper_figures.__main__ import main as paper_figures_main
 
 PLANT = PlantModel(-2.0, (Mode(50.0, 0.03),), (Mode(80.0, 0.02),), 5e-3)
 
@@ -83,15 +84,20 @@ def test_raw_and_frequency_response_together(tmp_path: Path) -> None:
     assert read_model(output).fit["synthetic"] is True
 
 
-@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_figure_and_the_same_bytes_twice(tmp_path: Path, sweeps: list[Path], suffix: str) -> None:
+def test_the_same_bytes_twice_and_its_figure(tmp_path: Path, sweeps: list[Path]) -> None:
     written = []
-    for turn in ("a", "b"):
-        model, figure = tmp_path / f"{turn}.json", tmp_path / f"{turn}{suffix}"
-        result = _fit(*sweeps, "--modes", 1, "--output", model, "--figure", figure)
+    for name in ("a", "b"):
+        model, folder = tmp_path / f"{name}.json", tmp_path / name
+        folder.mkdir()
+        result = _fit(*sweeps, "--modes", 1, "--output", model)
         assert result.exit_code == 0, result.output
-        written.append((model.read_bytes(), figure.read_bytes()))
+        bode = ["bode", str(tmp_path / "a.json"), *map(str, sweeps), "--output", str(folder)]
+        assert CliRunner().invoke(paper_figures_main, bode).exit_code == 0
+        written.append(
+            [model.read_bytes(), *((folder / f"bode.{kind}").read_bytes() for kind in ("pdf", "svg", "png"))]
+        )
     assert written[0] == written[1]
+    assert "W_a" in (tmp_path / "a" / "bode.txt").read_text(encoding="utf-8")
 
 
 def _refused(result: Result, folder: Path, *words: str) -> None:
@@ -121,26 +127,18 @@ def _refused(result: Result, folder: Path, *words: str) -> None:
 def test_bad_files(tmp_path: Path, content: str, words: list[str]) -> None:
     bad = tmp_path / "bad.csv"
     bad.write_text(content, encoding="utf-8")
-    _refused(_fit(bad, "--output", tmp_path / "model.json", "--figure", tmp_path / "fit.png"), tmp_path, *words)
+    _refused(_fit(bad, "--output", tmp_path / "model.json"), tmp_path, *words)
 
 
 def test_missing_file_and_missing_folder(tmp_path: Path) -> None:
     bad = _sweep(tmp_path / "bad.csv", 0)
     _refused(_fit(tmp_path / "no.csv", "--output", tmp_path / "model.json"), tmp_path, "no.csv: no such file")
-    model = tmp_path / "model.json"
-    nowhere = tmp_path / "none" / "fit.png"
-    _refused(_fit(bad, "--output", model, "--figure", nowhere), tmp_path, "cannot be written")
+    _refused(_fit(bad, "--output", tmp_path / "none" / "model.json"), tmp_path, "cannot be written")
 
 
 def test_data_that_cannot_carry_the_parameters(tmp_path: Path) -> None:
     bad = _sweep(tmp_path / "bad.csv", 0, lines=12)
     _refused(_fit(bad, "--modes", 3, "--output", tmp_path / "model.json"), tmp_path, "holds 12 lines", "16 or more")
-
-
-def test_figure_of_another_kind(tmp_path: Path) -> None:
-    bad = _sweep(tmp_path / "bad.csv", 0)
-    figure = tmp_path / "fit.gif"
-    _refused(_fit(bad, "--output", tmp_path / "m.json", "--figure", figure), tmp_path, "'.gif'", ".pdf, .svg, .png")
 
 
 def test_structure_loss_and_order_of_the_bound_as_asked(tmp_path: Path, sweeps: list[Path]) -> None:

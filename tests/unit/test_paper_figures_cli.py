@@ -7,6 +7,7 @@ from click.testing import CliRunner, Result
 from matplotlib.figure import Figure
 
 from paper_figures import __main__ as command_line
+from paper_figures.thesis import figure_registry
 
 
 class FigureOfTable:
@@ -33,7 +34,7 @@ def folders(tmp_path: Path) -> tuple[Path, Path]:
 
 @pytest.fixture
 def figure_of_table(monkeypatch):
-    monkeypatch.setattr(command_line, "figure_module", lambda name: FigureOfTable())
+    monkeypatch.setattr(figure_registry, "figure_module", lambda name: FigureOfTable())
 
 
 def run(folders: tuple[Path, Path], *names: str) -> Result:

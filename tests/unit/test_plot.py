@@ -10,12 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, Mode, PlantModel
-from identification.output.plots import decibel, draw_distance, draw_fit, draw_phase, draw_relative_distance
 from identification.sweeps.response import FrequencyResponse
+from paper_figures.look.bode import decibel, draw_distance, draw_phase, draw_relative_distance, plot_bode
 
 PLANT = PlantModel(-2.0, (Mode(50.0, 0.03),), (Mode(80.0, 0.02),), 0.05)
 BOUND = AdditiveBound.printed_form(0.3, 40.0, 60.0, 0.2)
+MODEL = IdentifiedModel(PLANT, BOUND, None, {})
 OMEGA = np.linspace(10.0, 300.0, 200)
 SWEEP = FrequencyResponse(OMEGA, 1.1 * PLANT(1j * OMEGA), None, "a.csv")
 
@@ -36,9 +38,10 @@ def labels(panel: Axes) -> list[str]:
 
 
 def test_fit_has_three_panels_with_tests_behind_the_model() -> None:
-    figure = draw_fit([SWEEP, SWEEP], PLANT, BOUND)
+    figure = plot_bode(MODEL, [SWEEP, replace(SWEEP, synthetic=True)])
     assert [len(panel.lines) for panel in figure.axes] == [3, 3, 3]
     assert [panel.get_ylabel() for panel in figure.axes] == ["Magnitude [dB]", "Phase [deg]", "Distance [dB]"]
+    assert figure.get_suptitle() == "synthetic data, not measured"
     for line in figure.axes[0].lines[:2]:
         assert line.get_ydata() == pytest.approx(decibel(np.abs(SWEEP.response)))
     keys = [[text.get_text() for text in panel.get_legend().get_texts()] for panel in figure.axes]
@@ -88,5 +91,5 @@ def test_phase_of_the_tests_is_on_the_models_turn(panel: Axes) -> None:
 )
 def test_frequencies_can_be_read_however_narrow_the_band(low: float, high: float, wanted: list[str]) -> None:
     omega = np.geomspace(low, high, 50)
-    figure = draw_fit([FrequencyResponse(omega, 1.1 * PLANT(1j * omega), None, "a.csv")], PLANT, BOUND)
+    figure = plot_bode(MODEL, [FrequencyResponse(omega, 1.1 * PLANT(1j * omega), None, "a.csv")])
     assert labels(figure.axes[-1]) == wanted

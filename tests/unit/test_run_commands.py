@@ -67,9 +67,9 @@ def test_a_reference_from_a_file(command: str, design_json: Path, reference_csv:
 def test_a_ramp(command: str, design_json: Path) -> None:
     table = written(invoke(command, design_json, "--slope", "2", "--amplitude", "0", "--offset", "0.5"), design_json)
     np.testing.assert_allclose(table["reference"], 0.5 + 2 * table["time_s"], atol=1e-9)
-    table = written(invoke(command, design_json, "--slope", "-2"), design_json)
+    table = written(invoke(command, design_json, "--slope", "-2", "--amplitude", "50", "--phase", "1"), design_json)
     np.testing.assert_allclose(
-        table["reference"], 50 * np.sin(1.5 * table["time_s"] + np.pi / 2) - 2 * table["time_s"], atol=1e-9
+        table["reference"], 50 * np.sin(1.5 * table["time_s"] + 1) - 2 * table["time_s"], atol=1e-9
     )
 
 

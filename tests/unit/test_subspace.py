@@ -11,7 +11,6 @@ import pytest
 from held_plant import PLANTS, held_response
 
 from data.thesis import model_named
-from identification.fitting import subspace_check
 from identification.fitting.subspace_check import SubspaceCheck, check_modes
 from identification.model.plant import Mode, PlantModel
 from identification.sweeps.read_sweeps import read_sweeps
@@ -113,12 +112,19 @@ def test_no_answer_is_said_and_nothing_leaks(
         np.log(np.zeros(1))
         raise failure
 
-    monkeypatch.setattr(subspace_check.sippy_unipi, "system_identification", fails)
+    monkeypatch.setattr("sippy_unipi.system_identification", fails)
     plant = PLANTS["no integrator, real pole"]
     check = check_modes(plant, _record(plant), BAND)
     assert check.modes == ()
     assert str(check).startswith(f"N4SID of order 14: no answer ({type(failure).__name__}")
     assert capfd.readouterr() == ("", "")
+
+
+def test_without_its_package_the_check_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("identification.fitting.subspace_check.find_spec", lambda name: None)
+    plant = PLANTS["no integrator, real pole"]
+    said = str(check_modes(plant, _record(plant), BAND))
+    assert said.endswith('no answer (sippy-unipi is missing; pip install "antiwindup-thesis[check]")')
 
 
 def test_records_that_give_no_answer() -> None:

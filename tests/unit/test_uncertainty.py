@@ -13,9 +13,9 @@ from scipy.optimize import differential_evolution
 
 from identification.base.errors import InputError
 from identification.bound import bound_residuals as module
-from identification.bound.bound_residuals import HIGHEST_ORDER, bound_residuals
+from identification.bound.bound_residuals import bound_residuals
 from identification.bound.envelope import envelope_of
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.plant import HIGHEST_ORDER, AdditiveBound, Mode, PlantModel
 from identification.sweeps.response import FrequencyResponse
 
 Real = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Draw the tests, the model and the residuals under their bound, panel by panel."""
+"""Tests, model and the residuals under their bound, panel by panel and together."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullFormatter
 
 from identification.base.arrays import Real
+from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, PlantModel
-from identification.sweeps.response import FrequencyResponse
+from identification.sweeps.response import FrequencyResponse, alias_free
+from paper_figures.look.style import styled
 
 MEASURED: dict[str, Any] = {
     "color": "0.55",
@@ -38,30 +40,35 @@ FEW = 100  # ratio of frequencies between which there are too few powers of ten
 CHANCE = 0.3  # % of the distances, the least, that a panel may leave out: single ones come near zero by chance
 
 
-def draw_fit(tests: Sequence[FrequencyResponse], plant: PlantModel, bound: AdditiveBound) -> Figure:
-    """Bode magnitude and phase of the tests (markers) and the model (line); residuals under W_a.
+@styled()
+def plot_bode(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> Figure:
+    """Draw magnitude and phase of tests and model, and the residuals under W_a.
 
     Parameters
     ----------
+    model
+        The plant and its additive bound.
     tests
-        The responses that were fitted.
-    plant, bound
-        The model and its additive bound.
+        One or more responses; the aliases of a held input are taken away.
 
     Returns
     -------
     Figure
-        Three panels, a to c, over omega in rad/s.
+        Three panels, a to c, over omega in rad/s. The title says so if a test is synthetic.
     """
+    plant, bound = model.plant, model.additive_bound
+    clean = [alias_free(test, plant) for test in tests]
     figure = Figure(figsize=(5.2, 6.2), layout="constrained")
     magnitude, phase, distance = figure.subplots(3, 1, sharex=True)
-    draw_magnitude(magnitude, tests, plant)
-    draw_phase(phase, tests, plant)
-    draw_distance(distance, tests, plant, bound)
+    draw_magnitude(magnitude, clean, plant)
+    draw_phase(phase, clean, plant)
+    draw_distance(distance, clean, plant, bound)
     for panel, letter in zip((magnitude, phase, distance), "abc", strict=True):
         panel.grid(which="both", linewidth=0.3, color="0.85")
-        panel.legend(loc="lower left", frameon=False, fontsize=8, markerscale=4)
+        panel.legend(loc="lower left", markerscale=4)
         panel.text(0.985, 0.95, f"({letter})", transform=panel.transAxes, ha="right", va="top")
+    if any(test.synthetic for test in tests):
+        figure.suptitle("synthetic data, not measured", fontsize="medium")
     figure.align_ylabels()
     distance.set_xlabel(r"$\omega$ [rad/s]")
     return figure

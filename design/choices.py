@@ -1,0 +1,7 @@
+"""What a designer chooses among, and what is chosen unless stated."""
+
+METHODS = ("zeros", "lagrange", "poles")
+"""How Q is designed."""
+
+SECTOR = 0.95
+"""Sector of the corrected compensator unless another is stated: \\|u\\| may reach twenty times the limits."""

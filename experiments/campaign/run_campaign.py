@@ -1,0 +1,113 @@
+"""A whole campaign: run what is not kept yet, keep it, say what came out."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import click
+import numpy as np
+import pandas as pd
+from tqdm import tqdm
+
+from design.design_file import Design
+from experiments.campaign.checkpoint import CampaignFile
+from experiments.campaign.distributions import PERCENT, campaign_tables
+from experiments.campaign.run_plants import Campaign, code_sha256
+from experiments.campaign.workers import run_here, run_on_cluster
+from experiments.runs.guarantee import sector_text
+from experiments.runs.references import Reference
+from identification.base.errors import InputError
+from identification.base.files import read_bytes
+
+MOST_PLANTS = 10**9
+
+
+def run_campaign(
+    content: Design,
+    design: Path,
+    plants: int,
+    seed: int,
+    reference: Reference,
+    limit: float,
+    periods: int,
+    scheduler: str | None,
+    output: Path,
+) -> None:
+    """Run a campaign, keep it, and say what came out.
+
+    Parameters
+    ----------
+    content, design
+        The design and its file.
+    plants, seed
+        How many plants are drawn, and from which random numbers.
+    reference, limit, periods
+        Of every run, see :class:`experiments.campaign.run_plants.Campaign`.
+    scheduler
+        Address of a Dask cluster's; None runs the campaign here.
+    output
+        The parquet file.
+
+    Raises
+    ------
+    InputError
+        A number is out of range, a plant cannot be drawn or run, or the file cannot be written.
+    """
+    if not (1 <= plants <= MOST_PLANTS and seed >= 0):
+        raise InputError(
+            f"--plants is {plants} and --seed {seed}; expected 1 to {MOST_PLANTS} plants, a seed from 0 on"
+        )
+    digest = hashlib.sha256(read_bytes(design)).hexdigest()
+    campaign = Campaign(content, digest, seed, reference, limit, periods, code_sha256())
+    file = CampaignFile(output, campaign, plants, design)
+    missing = file.missing
+    left = sum(last - first for first, last in missing)
+    if left < plants:
+        click.echo(f"{plants - left} of {plants} plants are there already", err=True)
+    if missing:
+        done = run_here(campaign, missing) if scheduler is None else run_on_cluster(campaign, missing, scheduler)
+        try:
+            with tqdm(total=plants, initial=plants - left, desc="campaign", unit=" plants", disable=None) as bar:
+                for chunk, columns in done:
+                    file.keep(chunk, columns)
+                    bar.update(chunk[1] - chunk[0])
+        except KeyboardInterrupt:
+            kept = plants - sum(last - first for first, last in file.missing)
+            click.echo(f"{kept} of {plants} plants are kept in {file.folder}; the same command goes on", err=True)
+            raise
+        finally:
+            done.close()
+    file.finish()
+    summary = campaign_tables(output)["campaign_summary"]
+    click.echo(_promised(summary))
+    click.echo(f"{plants} plants within W_a -> {output}; limits +-{limit:.6g}, {campaign.horizon_s:.6g} s each")
+    for line in _lines(summary):
+        click.echo(line)
+
+
+def _promised(summary: pd.DataFrame) -> str:
+    """Of which anti-windup a guarantee speaks of these plants, and how many of its runs it covers."""
+    said = [
+        f"the guarantee of {row['run']}, the sector {sector_text(row['guaranteed_sector'])}, covers "
+        f"{row['covered']:.2%} of its runs"
+        for row in summary[summary["guaranteed_sector"] > 0].to_dict("records")
+    ]
+    return f"Of all plants within W_a {'; '.join(said)}" if said else "No guarantee speaks of all plants within W_a"
+
+
+def _lines(summary: pd.DataFrame) -> list[str]:
+    """The summary as a table."""
+    shares = {"covered": "covered", "linear_stable": "stable", "diverged": "diverged", "recovered": "recovered"}
+    measures = {"peak_error_{}": "peak error", "steady_error_{}": "last period", "recovery_{}_s": "recovery s"}
+    heads = [f"{label:>11s}" for label in shares.values()]
+    lines = ["".join([" " * 10, *heads, *(f"{f'{label}, 5 50 95 %':>30s}" for label in measures.values())])]
+    for row in summary.to_dict("records"):
+        cells = [f"{row['run']:10s}", *(f"{row[name]:11.2%}" for name in shares)]
+        cells += [f"{_number(row[form.format(percent)]):>10s}" for form in measures for percent in PERCENT]
+        lines.append("".join(cells))
+    return lines
+
+
+def _number(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.4g}"

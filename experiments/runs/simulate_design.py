@@ -1,0 +1,68 @@
+"""One run of a design: its loop built and simulated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from design.anti_windup.compensator import AntiWindup
+from design.design_file import Design
+from experiments.engine.simulate import Run, simulate
+from experiments.runs.compare_anti_windups import span
+from experiments.runs.design_loop import design_loop
+from experiments.runs.references import Reference, SampledReference
+from identification.base.errors import InputError
+from identification.model.plant import PlantModel
+
+PERIODS = 5
+SAMPLES = 5001
+
+
+def simulate_design(
+    design: Design,
+    limits: float | tuple[float, float],
+    reference: Reference | SampledReference,
+    anti_windup: str | AntiWindup | None = "corrected",
+    *,
+    until_s: float | None = None,
+    samples: int = SAMPLES,
+    plant: PlantModel | None = None,
+) -> Run:
+    """Simulate the loop of Fig. 2.6 around a design from rest, every dead time exact.
+
+    Parameters
+    ----------
+    design
+        Of either kind.
+    limits
+        Of the actuator in its unit, (lower, upper), or one number for +-limits; infinite for none.
+    reference
+        r(t) in the plant's output unit.
+    anti_windup
+        The name of one that the design holds, or one of your own; None (or "none") for no anti-windup.
+    until_s
+        Length of the run in seconds. Unless given, five periods of the slowest sinusoid; of a constant, ten times the
+        recovery time of the corrected anti-windup; of samples, their last time.
+    samples
+        How many evenly spaced times the run is read at; they do not influence the integration.
+    plant
+        The true plant; the design's own model unless given.
+
+    Returns
+    -------
+    Run
+        See :class:`experiments.engine.simulate.Run`.
+
+    Raises
+    ------
+    InputError
+        The design holds no such anti-windup, fewer samples than two are asked for, or see
+        :func:`experiments.engine.simulate.simulate`.
+    """
+    if samples < 2:
+        raise InputError(f"{samples} samples are asked for; expected two or more")
+    if isinstance(anti_windup, str):
+        anti_windup = None if anti_windup == "none" else design.compensator(anti_windup)
+    if until_s is None:
+        until_s = PERIODS * span(design, reference) if isinstance(reference, Reference) else reference.time_s[-1]
+    low, high = limits if isinstance(limits, tuple) else (-limits, limits)
+    return simulate(design_loop(design, reference, anti_windup, plant), (low, high), np.linspace(0.0, until_s, samples))

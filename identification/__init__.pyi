@@ -1,0 +1,19 @@
+from identification.base.errors import InputError
+from identification.fit_model import fit
+from identification.model.model_file import IdentifiedModel, read_model
+from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.sweeps.read_sweeps import read_sweeps
+from identification.sweeps.response import FrequencyResponse, alias_free
+
+__all__ = [
+    "AdditiveBound",
+    "FrequencyResponse",
+    "IdentifiedModel",
+    "InputError",
+    "Mode",
+    "PlantModel",
+    "alias_free",
+    "fit",
+    "read_model",
+    "read_sweeps",
+]

@@ -1,0 +1,115 @@
+"""Frequency responses -> the model that model.json holds: plant, bound, and how they came about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from identification.bound.bound_residuals import BoundReport, bound_residuals
+from identification.fitting.fit_plant import FitResult, fit_plant
+from identification.fitting.subspace_check import SubspaceCheck, check_modes
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import PlantModel
+from identification.model.structure import Wanted
+from identification.output.fit_facts import facts, standard_errors
+from identification.sweeps.response import FrequencyResponse, alias_free
+
+Tick = Callable[[], object]
+
+
+@dataclass(frozen=True)
+class ModelFit:
+    """A fitted model and all that it came from.
+
+    Parameters
+    ----------
+    model
+        Plant, bound, standard errors and the record of the fit.
+    plant_fit, bound_fit
+        How plant and bound were found.
+    checks
+        By the name of each test with a raw record, the subspace check of its modes.
+    tests
+        The responses without the aliases of a held input.
+    """
+
+    model: IdentifiedModel
+    plant_fit: FitResult
+    bound_fit: BoundReport
+    checks: Mapping[str, SubspaceCheck]
+    tests: tuple[FrequencyResponse, ...]
+
+
+def fit_model(
+    tests: Sequence[FrequencyResponse],
+    wanted: Wanted | None = None,
+    *,
+    soft: bool = False,
+    bound_order: int = 2,
+    seed: int = 0,
+    tick: Tick = lambda: None,
+) -> ModelFit:
+    """Fit the plant of Thesis Eq. (2.20) and the bound of (2.21) to tests.
+
+    Parameters
+    ----------
+    tests, wanted, soft, seed, tick
+        As for :func:`identification.fitting.fit_plant.fit_plant`.
+    bound_order
+        Number of poles of W_a, see :func:`identification.bound.bound_residuals.bound_residuals`.
+
+    Raises
+    ------
+    InputError
+        As these two do.
+    """
+    result = fit_plant(tests, wanted, soft=soft, seed=seed, tick=tick)
+    plants = [test.plant for test in result.tests]
+    checks = _checks(tests, plants, tick)
+    clean = tuple(alias_free(test, result.plant) for test in tests)
+    report = bound_residuals(result.plant, clean, plants, bound_order)
+    model = IdentifiedModel(result.plant, report.bound, standard_errors(result), facts(tests, result, report, checks))
+    return ModelFit(model, result, report, checks, clean)
+
+
+def fit(
+    tests: Sequence[FrequencyResponse],
+    *,
+    modes: int | tuple[int, int] | None = None,
+    real: int | tuple[int, int] | None = None,
+    integrators: int | None = None,
+    soft: bool = False,
+    bound_order: int = 2,
+    seed: int = 0,
+) -> IdentifiedModel:
+    """Fit plant and bound to tests, with what is left open chosen by the Bayesian information criterion.
+
+    Parameters
+    ----------
+    tests
+        One or more responses of the same plant.
+    modes, real
+        Zero and pole modes, real zeros and poles: one number for both, or a pair.
+    integrators
+        Poles at s = 0, up to 2.
+    soft, bound_order, seed
+        As for :func:`fit_model`.
+
+    Raises
+    ------
+    InputError
+        See :func:`fit_model`.
+    """
+    pairs = ((count, count) if isinstance(count, int) else count for count in (modes, real))
+    wanted = Wanted(integrators, *pairs)
+    return fit_model(tests, wanted, soft=soft, bound_order=bound_order, seed=seed).model
+
+
+def _checks(tests: Sequence[FrequencyResponse], plants: Sequence[PlantModel], tick: Tick) -> dict[str, SubspaceCheck]:
+    """By its name, the subspace check of each test that was read from a raw record against its own fit."""
+    checks = {}
+    for test, plant in zip(tests, plants, strict=True):
+        if test.record is not None:
+            checks[test.name] = check_modes(plant, test.record, (float(test.omega[0]), float(test.omega[-1])))
+            tick()
+    return checks

@@ -1,0 +1,91 @@
+"""Imports go one way, between rooms and between their wings, and the contracts in pyproject.toml notice if not."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+LINT = [str(Path(sys.executable).with_name("lint-imports")), "--no-cache", "--no-logo"]
+
+
+def broken(tree: Path) -> list[str]:
+    """The names of the contracts that a tree breaks."""
+    done = subprocess.run(LINT, cwd=tree, capture_output=True, text=True, check=False)
+    names = re.findall(r"^(.+) BROKEN", done.stdout, flags=re.MULTILINE)
+    assert f"{len(names)} broken" in done.stdout, done.stdout + done.stderr
+    assert done.returncode == bool(names)
+    return names
+
+
+def spoil(tree: Path, importer: str, line: str) -> None:
+    """Add a line to a module."""
+    path = tree / f"{importer.replace('.', '/')}.py"
+    path.write_text(f"{path.read_text(encoding='utf-8')}\n\n{line}\n", encoding="utf-8")
+
+
+def test_every_contract_is_kept() -> None:
+    assert broken(ROOT) == []
+
+
+ROOM, TOOL = "rooms import to the left", "the tool knows nothing of the thesis, but for command lines"
+FIGURE = "no figure imports another, but what several share"
+STUDY, LEDGER = "experiments.thesis.studies.pid", "experiments.thesis.claims.ledger"
+
+
+@pytest.mark.parametrize(
+    ("importer", "imported", "contract"),
+    [
+        ("design.stability.jet", "experiments.engine.simulate", ROOM),
+        ("identification.base.arrays", "data.thesis", ROOM),
+        ("identification.base.files", "identification.model.plant", "wings of identification"),
+        ("identification.fitting.likelihood", "identification.bound.shape", "wings of identification"),
+        ("design.hinf.pick", "design.stability.axis", "wings of design"),
+        ("experiments.engine.pade", "experiments.runs.batch", "wings of experiments"),
+        (STUDY, LEDGER, "wings of experiments.thesis"),
+        ("paper_figures.look.style", "paper_figures.summary.page", "wings of paper_figures"),
+        ("paper_figures.thesis.figures.fig_4_04", "paper_figures.thesis.report.html", "wings of paper_figures.thesis"),
+        ("paper_figures.thesis.figures.fig_4_04", "paper_figures.thesis.figures.fig_4_03", FIGURE),
+        ("design.auditing.as_text", "data.thesis", TOOL),
+        ("experiments.runs.batch", STUDY, TOOL),
+        ("paper_figures.summary.page", STUDY, TOOL),
+    ],
+)
+def test_a_wrong_import_breaks_its_contract(tree: Path, importer: str, imported: str, contract: str) -> None:
+    spoil(tree, importer, f"import {imported}")
+    assert contract in broken(tree)
+
+
+@pytest.mark.parametrize(("imported", "contract"), [("paper_figures.look.style", ROOM), (STUDY, TOOL)])
+def test_so_does_one_inside_a_function(tree: Path, imported: str, contract: str) -> None:
+    spoil(tree, "experiments.runs.batch", f"def lazy() -> None:\n    from {imported} import x")
+    assert contract in broken(tree)
+
+
+def test_a_new_wing_must_be_given_its_place(tree: Path) -> None:
+    (tree / "design" / "somewhere.py").write_text('"""Nothing."""\n', encoding="utf-8")
+    assert broken(tree) == ["wings of design"]
+
+
+@pytest.mark.parametrize("room", ["identification", "design", "experiments", "paper_figures"])
+def test_a_face_shows_its_own_room_without_the_thesis(room: str) -> None:
+    """The package imports what its stub names, which the contracts do not see."""
+    stub = (ROOT / room / "__init__.pyi").read_text(encoding="utf-8")
+    homes = re.findall(r"^from (\S+) import", stub, flags=re.MULTILINE)
+    assert homes
+    assert all(home.startswith(f"{room}.") and ".thesis" not in home for home in homes)
+
+
+@pytest.mark.parametrize("path", [*sorted((ROOT / "data").glob("*.py")), ROOT / "antiwindup.py"], ids=lambda p: p.name)
+def test_what_stands_beside_the_rooms_imports_none(path: Path) -> None:
+    """The data are made without the tool, and the console command imports a room only when it is asked for."""
+    names = {"identification", "design", "experiments", "paper_figures", "data"}
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        modules += [str(node.module)] if isinstance(node, ast.ImportFrom) else []
+        assert not names & {module.split(".")[0] for module in modules}

@@ -1,0 +1,94 @@
+"""The wheel, installed without network in an environment of its own, works from any folder; what is missing is said."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import sysconfig
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from design.design_file import Design
+from experiments.__main__ import main
+
+ROOT = Path(__file__).resolve().parents[2]
+ROOMS = ("identification", "design", "experiments", "paper_figures", "data/thesis")
+PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet"]
+ASKED = ["--reference-omega", "1.5", "--a", "4", "--e", "2", "--f", "1"]
+
+
+def run(*command: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(list(map(str, command)), cwd=cwd, capture_output=True, text=True, check=False)
+
+
+def test_the_wheel_works_from_any_folder(tree: Path, tmp_path: Path) -> None:
+    built = run(
+        *PIP, "wheel", "--no-build-isolation", "--no-deps", "--no-index", "--wheel-dir", tmp_path, tree, cwd=tree
+    )
+    assert built.returncode == 0, built.stderr
+    (wheel,) = tmp_path.glob("*.whl")
+    held = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    files = {path for room in ROOMS for path in (ROOT / room).rglob("*") if path.is_file()}
+    modules = {path.relative_to(ROOT).as_posix() for path in files if path.suffix not in (".pyc", ".nbi", ".nbc")}
+    assert held == modules | {"antiwindup.py"}
+
+    environment = tmp_path / "environment"
+    venv.create(environment)
+    python = environment / "bin" / "python"
+    installed = run(*PIP, "--python", python, "install", "--no-deps", "--no-index", wheel, cwd=tmp_path)
+    assert installed.returncode == 0, installed.stderr
+    # the other packages, of which this folder's own .pth files, and with them an editable install of ours, are not read
+    (packages,) = environment.glob("lib/*/site-packages")
+    (packages / "others.pth").write_text(sysconfig.get_path("purelib"), encoding="utf-8")
+
+    folder = tmp_path / "elsewhere"
+    (folder / "data").mkdir(parents=True)
+    (folder / "data" / "mine.csv").touch()
+    command = environment / "bin" / "antiwindup"
+    assert run(command, "--version", cwd=folder).stdout == "antiwindup, version 0.1.0\n"
+    for number, start in enumerate(([command, "design"], [python, "-m", "design"])):
+        output = folder / f"design_{number}.json"
+        done = run(*start, "extended", "implied", *ASKED, "--output", output, cwd=folder)
+        assert done.returncode == 0, done.stderr
+        assert json.loads(output.read_text(encoding="utf-8"))["kind"] == "extended"
+    where = run(python, "-c", "import design, data.thesis as data; print(design.__file__, data.__file__)", cwd=folder)
+    assert all(path.startswith(str(packages)) for path in where.stdout.split())
+
+    refused = run(command, "design", "extended", "nowhere.json", *ASKED, "--output", "x.json", cwd=folder)
+    assert (refused.returncode, refused.stderr) == (2, "Error: nowhere.json: no such file\n")
+
+
+def test_the_help_imports_no_room() -> None:
+    code = "import sys, antiwindup; antiwindup.main(['--help'], standalone_mode=False); print(*sys.modules)"
+    done = run(sys.executable, "-c", code, cwd=ROOT)
+    assert all(f"\n  {room}" in done.stdout for room in ROOMS[:4])
+    assert not {"numpy", "design.__main__"} & set(done.stdout.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize(
+    ("missing", "arguments"),
+    [
+        ("pyarrow", ["campaign-tables", "campaign.parquet", "--output", "."]),
+        ("pyarrow", ["campaign", "design.json", "--output", "campaign.parquet"]),
+        ("distributed", ["campaign", "design.json", "--output", "campaign.parquet", "--scheduler", "tcp://x:1"]),
+    ],
+)
+def test_a_missing_extra_is_one_sentence(
+    missing: str, arguments: list[str], extended_design: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "design.json").write_text(extended_design.to_json(), encoding="utf-8")
+    if arguments[0] == "campaign":
+        arguments = [*arguments, "--limit", "1", "--plants", "1", "--seed", "1", "--amplitude", "1"]
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, missing, None)
+    refused = CliRunner().invoke(main, arguments)
+    assert refused.exit_code == 2
+    assert refused.stderr.splitlines()[-1] == (
+        f'Error: {missing} is not installed, which this command needs; give pip install "antiwindup-thesis[campaign]"'
+    )
+    assert {path.name for path in tmp_path.iterdir()} == {"design.json"}

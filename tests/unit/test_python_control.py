@@ -1,0 +1,87 @@
+"""Plants, bounds, blocks, responses and runs as python-control's objects, and back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import control
+import numpy as np
+import pytest
+
+from design.blocks.block import Block
+from design.design_file import Design
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.references import sinusoid
+from identification.base.errors import InputError
+from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.sweeps.response import FrequencyResponse
+
+PLANT = PlantModel(-3.0, (Mode(20.0, 0.1),), (Mode(30.0, 0.02), Mode(50.0, 1.5)), 0.02, 2, (7.0,), (40.0, 90.0))
+BOUND = AdditiveBound(0.3, (Mode(9.0, 0.4),), (Mode(12.0, 0.1),), (2.0,), (5.0,))
+OMEGA = np.geomspace(0.1, 1e3, 40)
+
+
+def test_a_plant_goes_there_and_back() -> None:
+    system = PLANT.to_control()
+    assert "without its dead time" in system.name
+    np.testing.assert_allclose(system(1j * OMEGA), PLANT.without_delay()(1j * OMEGA), rtol=1e-9)
+    back = PlantModel.from_control(system, PLANT.delay_s)
+    assert (back.integrators, len(back.zero_modes), len(back.pole_modes)) == (2, 1, 1)  # zeta = 1.5 are real poles
+    np.testing.assert_allclose(back(1j * OMEGA), PLANT(1j * OMEGA), rtol=1e-9)
+    assert replace(PLANT, delay_s=0.0).to_control().name == "P"
+
+
+def test_the_dead_time_by_pade_on_request() -> None:
+    slow = OMEGA[1 / PLANT.delay_s > OMEGA]
+    np.testing.assert_allclose(PLANT.to_control(pade_order=5)(1j * slow), PLANT(1j * slow), rtol=1e-9)
+    with pytest.raises(InputError, match="the order of the Pade approximation is -1"):
+        PLANT.to_control(pade_order=-1)
+
+
+def test_a_bound_and_a_block_go_there_and_back() -> None:
+    back = AdditiveBound.from_control(BOUND.to_control())
+    np.testing.assert_allclose(back(1j * OMEGA), BOUND(1j * OMEGA), rtol=1e-9)
+    block = Block(2.0, (1 + 2j, 1 - 2j), (-3.0, 4.0), 0.5)
+    np.testing.assert_allclose(Block.from_control(block.to_control(), 0.5)(1j * OMEGA), block(1j * OMEGA), rtol=1e-9)
+
+
+def test_state_spaces_are_taken_too() -> None:
+    system = control.ss([[-2.0, 1.0], [0.0, -5.0]], [[0.0], [1.0]], [[3.0, 0.0]], 0.0)
+    np.testing.assert_allclose(PlantModel.from_control(system)(1j * OMEGA), system(1j * OMEGA), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("system", "part"),
+    [
+        (control.tf([1.0], [1.0, -1.0]), "a number of real_poles is -1"),
+        (control.tf([1.0], [1.0, 0.0, 4.0]), "zeta is"),
+        (control.tf([1.0], [1.0, 0.5], 0.1), "of discrete time, dt = 0.1"),
+        (control.ss([[-1.0]], [[1.0, 1.0]], [[1.0]], [[0.0, 0.0]]), "2 inputs and 1 outputs"),
+        (control.tf([0.0], [1.0, 1.0]), "is 0 or not finite"),
+        ("P", "str is no transfer function"),
+    ],
+)
+def test_what_is_no_plant_is_refused(system: object, part: str) -> None:
+    with pytest.raises(InputError, match=part):
+        PlantModel.from_control(system)
+
+
+def test_a_response_goes_there_and_back() -> None:
+    test = FrequencyResponse(OMEGA, PLANT(1j * OMEGA), None, "mine")
+    data = test.to_control()
+    np.testing.assert_array_equal(data(1j * OMEGA[3]), test.response[3])
+    back = FrequencyResponse.from_control(data)
+    np.testing.assert_array_equal(back.response, test.response)
+    assert back.name == "mine"
+    with pytest.raises(InputError, match="3 frequencies; expected 8"):
+        FrequencyResponse.from_control(control.frd(test.response[:3], OMEGA[:3]))
+
+
+def test_a_run_is_a_time_response(extended_design: Design) -> None:
+    loop = design_loop(extended_design, sinusoid(50.0, 1.5, 1.0, 0.0), extended_design.compensator("corrected"))
+    run = simulate(loop, (-12.0, 12.0), np.linspace(0.0, 1.0, 101))
+    response = run.to_control()
+    np.testing.assert_array_equal(response.outputs[response.output_labels.index("output")], run.outputs["output"])
+    np.testing.assert_array_equal(response.inputs[0], run.saturated_control)
+    np.testing.assert_array_equal(response.time, run.time_s)
