@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from design.blocks.block import plant_block
 from design.blocks.frequency_peak import frequency_grid
@@ -13,7 +12,7 @@ from design.stability.characteristic_roots import closing_omega, largest_beyond,
 from design.stability.jet import combined, jet
 from design.stability.margins import delay_loop, responses
 from design.stability.stable_intervals import AxisLoop
-from identification.base.arrays import Complex, Real
+from identification.base.arrays import Complex, Real, Whole
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
@@ -62,7 +61,7 @@ class PerturbedLoop:
         axis = AxisLoop(self.loop)
         control = (self.loop.forward * axis.a[0],)
 
-        def judge(centre: Real, half: Real) -> NDArray[np.int_]:
+        def judge(centre: Real, half: Real) -> Whole:
             whole = combined(*axis.both(centre, half), 1.0)
             clear = whole.is_clear_of_zero & jet(control, 0.0, centre, half).is_clear_of_zero
             return np.where(clear, NO_ZERO, HALVE)

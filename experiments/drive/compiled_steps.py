@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from experiments.drive.difference_equations import SampledBlock
-
-Array = NDArray[Any]
+from identification.base.arrays import Array
 
 MOST = 1e100  # times the limits, or without limits of a state: beyond it a loop diverges
 ENORMOUS = 1e250  # a state with which no run goes on, whatever the limits

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from identification.base.arrays import Array
+
 MOST = 60  # degree
 JUMP = 1e-9  # a control that is further than this share beyond a limit has jumped there
 

@@ -9,19 +9,17 @@ rounding, the delayed signals w being earlier polynomials shifted. A whole step 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from experiments.engine.compiled_loop import CompiledLoop
 from experiments.engine.crossings import leave
 from experiments.engine.kinks import BEYOND, Past, drop, images, shift
 from experiments.engine.signals import change, driven, expand, fill, unfold
 from experiments.engine.step_table import NEGLIGIBLE, NOTHING, advance, dot, times, whole_lanes
-
-Array = NDArray[Any]
+from identification.base.arrays import Array
 
 TRIALS = 30  # in which what brief dead times change settles,
 SETTLED = 4.0  # of what is negligible, when it moves by no more than that

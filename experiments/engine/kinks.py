@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from experiments.engine.crossings import MOST
-
-Array = NDArray[Any]
+from identification.base.arrays import Array
 
 BEYOND = 0.5  # of a step: how far beyond its end, where no kink is, the polynomial of a cut step is read
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from numba import njit
-from numpy.typing import NDArray
 
 from experiments.engine.kinks import shift
 from experiments.engine.step_table import NEGLIGIBLE, NOTHING, ROUNDING, Tables, dot, whole_lanes
-
-Array = NDArray[Any]
+from identification.base.arrays import Array
 
 
 @njit(cache=True, nogil=True)
