@@ -59,7 +59,7 @@ def structure_of(plant: PlantModel) -> Structure:
 
 def theta_of(plant: PlantModel) -> np.ndarray:
     """The parameters of :class:`identification.model.structure.Structure`, modes sorted by omega."""
-    values = [value for _, value in structure_of(plant).parameters(plant)]
+    values = [parameter.value for parameter in plant.parameters]
     return np.append(np.log(np.abs(values[:-1])), values[-1])
 
 
@@ -130,7 +130,7 @@ def one_set(draw: Callable[[np.random.Generator], PlantModel], relative: float, 
     rows = (exact / sigma)[:, None] * log_jacobian(structure, truth, OMEGA)
     bound = np.sqrt(np.diag(np.linalg.inv(2 * TESTS * (rows.conj().T @ rows).real)))
     lower, upper = result.nominal.intervals
-    values = np.array([value for _, value in structure.parameters(plant)])
+    values = np.array([parameter.value for parameter in plant.parameters])
     return Outcome(True, (result.nominal.theta - truth) / bound, (lower <= values) & (values <= upper), seconds)
 
 

@@ -33,7 +33,8 @@ with styled():
 @pytest.fixture(scope="module")
 def design_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("cold") / "design.json"
-    design = design_extended(model_named("implied"), [1.5], 4.0, [(2.0, 1.0)])
+    model = model_named("implied")
+    design = design_extended(model.plant, model.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
     path.write_text(design.to_json(), encoding="utf-8")
     return path
 

@@ -84,15 +84,17 @@ def delay_free(
     from data.thesis import model_named
     from design.chapter_2.design_delay_free import design_delay_free
 
-    design = design_delay_free(model_named(model), period, epsilon, recovery, sector, bandwidth)
-    hinf = design.hinf or {}
+    given = model_named(model)
+    design = design_delay_free(given.plant, given.additive_bound, period, epsilon, recovery, sector, bandwidth)
+    hinf = design.hinf
+    assert hinf is not None
     unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
     _finish(
         design,
         model,
         output,
-        f"H-infinity stabiliser: ||[W1 S; W2 T]|| = {upper_end(hinf['gamma'], 4)}, no stabilising controller below "
-        f"{lower_end(hinf['gamma_lower'], 4)}; every closed-loop pole left of -{lower_end(hinf['decay_rate'], 4)} 1/s"
+        f"H-infinity stabiliser: ||[W1 S; W2 T]|| = {upper_end(hinf.gamma, 4)}, no stabilising controller below "
+        f"{lower_end(hinf.gamma_lower, 4)}; every closed-loop pole left of -{lower_end(hinf.decay_rate, 4)} 1/s"
         f"{unstable}",
     )
 
@@ -140,8 +142,19 @@ def extended(
     if len(e) != len(f):
         raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected as many")
     pairs = list(zip(e, f, strict=True))
+    given = model_named(model)
     design = design_extended(
-        model_named(model), omegas, a, pairs, method, inverse_epsilon, robust_level, recovery, sector, bandwidth
+        given.plant,
+        given.additive_bound,
+        omegas,
+        a,
+        pairs,
+        method,
+        inverse_epsilon,
+        robust_level,
+        recovery,
+        sector,
+        bandwidth,
     )
     poles = ", ".join(f"{pole:.4g}" for pole in design.blocks["T_so"].poles)
     _finish(design, model, output, f"Q designed by its {method}; closed loop with 1/s has the poles {poles}")
@@ -156,10 +169,9 @@ def extended(
 def anti_windup_command(design: Path, name: str, numerator: str, denominator: str, output: Path) -> None:
     """Add a theta1~ of your own, strictly proper and stable, to those of DESIGN."""
     from design.anti_windup.compensator import anti_windup
-    from design.anti_windup.judge import facts
+    from design.anti_windup.judge import Compensator, judge
     from design.blocks.block import from_polynomial
     from design.design_file import read_design
-    from identification.model.model_file import IdentifiedModel
 
     content = read_design(design)
     if name in ("none", "thesis", "corrected") or not re.fullmatch(r"[\w-]+", name):
@@ -168,9 +180,9 @@ def anti_windup_command(design: Path, name: str, numerator: str, denominator: st
         _coefficients(text, option) for text, option in ((numerator, "numerator"), (denominator, "denominator"))
     )
     kind = anti_windup(from_polynomial(above) * from_polynomial(below).inverse())
-    model = IdentifiedModel(content.loop_plant, content.additive_bound, None, {})
+    judgement = judge(content.loop_plant, content.additive_bound, kind)
     _finish(
-        replace(content, anti_windup={**content.anti_windup, name: facts(model, kind)}),
+        replace(content, added={**content.added, name: Compensator(kind, judgement)}),
         str(design),
         output,
         f"with theta1~ = ({numerator})/({denominator}) as {name}",
@@ -213,10 +225,11 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
     write_whole({output: lambda path: path.write_text(text, encoding="utf-8")}, inputs=[Path(model)])
     click.echo(f"{design.kind} design -> {output}")
     click.echo(f"  {summary}")
-    for name, judged in design.anti_windup.items():
-        sector = "any" if judged["popov_sector"] is None else lower_end(judged["popov_sector"], 4)
-        stable = "stable" if judged["theta2_stable"] else "NOT stable: a lasting offset after saturation"
-        click.echo(f"  anti-windup {name:9s} f = {judged['f']:.4g}, Popov sector {sector}, theta2 {stable}")
+    for name, each in design.anti_windup.items():
+        judged = each.judgement
+        sector = "any" if judged.popov_sector is None else lower_end(judged.popov_sector, 4)
+        stable = "stable" if judged.theta2_stable else "NOT stable: a lasting offset after saturation"
+        click.echo(f"  anti-windup {name:9s} f = {judged.f:.4g}, Popov sector {sector}, theta2 {stable}")
 
 
 if __name__ == "__main__":

@@ -4,29 +4,28 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
+from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from design.anti_windup.compensator import AntiWindup
+from design.anti_windup.judge import Compensator, CorrectedCompensator, PrintedCompensator
 from design.blocks.block import Block, plant_denominator
+from design.hinf.mixed_sensitivity import Synthesis
+from design.parameters import DelayFreeParameters, ExtendedParameters
 from identification.base.errors import InputError
-from identification.model.model_file import (
-    bound_from_dict,
-    bound_to_dict,
-    member,
-    number,
-    plant_from_dict,
-    plant_to_dict,
-    read_json,
-)
+from identification.base.json_object import member, number, read_json
 from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.plant_json import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
 
 SCHEMA = 2
 KINDS = ("delay-free", "extended")
 
+Named = TypeVar("Named")
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Design:
     """A finished design of chapter 2 ("delay-free") or of chapters 3 and 4 ("extended").
 
@@ -43,13 +42,13 @@ class Design:
     blocks
         The design's transfer functions by the thesis's names, see README.
     hinf
-        gamma_lower, gamma, W1, W2 and what else the synthesis found; None for an extended design.
-    anti_windup
-        ``thesis``, ``corrected`` and any others: theta1_tilde and one_plus as :meth:`AntiWindup.to_dict` has them,
-        what was chosen (alpha, beta, gamma of (2.23); sector, bandwidth) and the members of
-        :class:`design.anti_windup.judge.Judgement`.
+        What the synthesis found; None for an extended design.
     parameters
-        What was chosen: epsilon, or a, the pairs e, f and the method for Q.
+        What was chosen.
+    thesis, corrected
+        The anti-windups that every design carries.
+    added
+        Any others by their names.
     """
 
     kind: str
@@ -57,20 +56,43 @@ class Design:
     additive_bound: AdditiveBound
     reference_omegas: tuple[float, ...]
     blocks: Mapping[str, Block]
-    hinf: Mapping[str, Any] | None
-    anti_windup: Mapping[str, Mapping[str, Any]]
-    parameters: Mapping[str, Any]
+    hinf: Synthesis | None
+    parameters: DelayFreeParameters | ExtendedParameters
+    thesis: PrintedCompensator
+    corrected: CorrectedCompensator
+    added: Mapping[str, Compensator] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        omegas = ", ".join(f"{omega:.4g}" for omega in self.reference_omegas)
+        return f"Design({self.kind}, reference at {omegas} rad/s, anti-windups {', '.join(self.anti_windup)})"
+
+    def _repr_html_(self) -> str:
+        """What each anti-windup is worth, as a notebook shows it."""
+        from pandas import DataFrame
+
+        table = DataFrame({name: asdict(each.judgement) for name, each in self.anti_windup.items()}).T
+        return f"<p>{escape(repr(self))}</p>{table.to_html()}"
 
     @property
     def loop_plant(self) -> PlantModel:
         """The plant as the design sees it: without dead time in chapter 2."""
         return self.plant.without_delay() if self.kind == "delay-free" else self.plant
 
+    @property
+    def anti_windup(self) -> dict[str, Compensator]:
+        """Every anti-windup by its name, ``thesis`` and ``corrected`` first."""
+        return {"thesis": self.thesis, "corrected": self.corrected, **self.added}
+
+    @property
+    def free(self) -> ExtendedParameters:
+        """The free parameters a, e, f, ... of an extended design; raises InputError for another one."""
+        if not isinstance(self.parameters, ExtendedParameters):
+            raise InputError(f"the design is '{self.kind}'; expected 'extended'")
+        return self.parameters
+
     def compensator(self, name: str) -> AntiWindup:
         """theta1~ of this name, such as ``thesis`` or ``corrected``; raises InputError when there is none."""
-        if name not in self.anti_windup:
-            raise InputError(f"there is no anti-windup '{name}'; the design has {', '.join(self.anti_windup)}")
-        return AntiWindup.from_dict(self.anti_windup[name])
+        return _named(self.anti_windup, name).kind
 
     def controller_parts(self) -> tuple[Block, Block]:
         """The blocks of C = forward/(1 - feedback exp(-h s)) with h the plant's dead time, (3.10) and (3.31).
@@ -83,19 +105,16 @@ class Design:
 
     def to_json(self) -> str:
         """The text of design.json; every number is finite or this raises ValueError."""
-        hinf = None
-        if self.hinf is not None:
-            hinf = {key: value.to_dict() if isinstance(value, Block) else value for key, value in self.hinf.items()}
         content = {
             "schema": SCHEMA,
             "kind": self.kind,
             "plant": plant_to_dict(self.plant),
             "additive_bound": bound_to_dict(self.additive_bound),
             "reference_omegas": list(self.reference_omegas),
-            "parameters": dict(self.parameters),
+            "parameters": self.parameters.to_dict(),
             "blocks": {name: block.to_dict() for name, block in self.blocks.items()},
-            "hinf": hinf,
-            "anti_windup": {name: dict(facts) for name, facts in self.anti_windup.items()},
+            "hinf": None if self.hinf is None else self.hinf.to_dict(),
+            "anti_windup": {name: each.to_dict() for name, each in self.anti_windup.items()},
         }
         return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
@@ -121,14 +140,10 @@ def read_design(path: Path, kind: str | None = None) -> Design:
             raise InputError(f"kind is {content.get('kind')!r}; expected one of {', '.join(KINDS)}")
         if kind not in (None, content["kind"]):
             raise InputError(f"kind is '{content['kind']}'; expected '{kind}'")
-        hinf = content.get("hinf")
-        if hinf is not None:
-            hinf = dict(member(content, "hinf"))
-            for name in ("gamma_lower", "gamma", "decay_rate", "gamma_line_lower", "gamma_line"):
-                number(hinf, name)
-            hinf |= {name: Block.from_dict(member(hinf, name)) for name in ("W1", "W2")}
-        anti_windup = member(content, "anti_windup")
-        blocks = member(content, "blocks")
+        delay_free = content["kind"] == "delay-free"
+        hinf = None if content.get("hinf") is None else Synthesis.from_dict(member(content, "hinf"))
+        anti_windup, blocks = member(content, "anti_windup"), member(content, "blocks")
+        parameters, kinds = member(content, "parameters"), {name: member(anti_windup, name) for name in anti_windup}
         design = Design(
             kind=content["kind"],
             plant=plant_from_dict(member(content, "plant")),
@@ -136,25 +151,33 @@ def read_design(path: Path, kind: str | None = None) -> Design:
             reference_omegas=_omegas(content),
             blocks={name: Block.from_dict(member(blocks, name)) for name in blocks},
             hinf=hinf,
-            anti_windup={name: member(anti_windup, name) for name in anti_windup},
-            parameters=member(content, "parameters"),
+            parameters=(DelayFreeParameters if delay_free else ExtendedParameters).from_dict(parameters),
+            thesis=PrintedCompensator.from_dict(_named(kinds, "thesis")),
+            corrected=CorrectedCompensator.from_dict(_named(kinds, "corrected")),
+            added={n: Compensator.from_dict(kinds[n]) for n in kinds if n not in ("thesis", "corrected")},
         )
-        if (hinf is not None) != (design.kind == "delay-free"):
+        if (hinf is not None) != delay_free:
             raise InputError(f"hinf belongs to a delay-free design and to no other; kind is '{design.kind}'")
-        needed = ("K", "Lambda", "G_A") if design.kind == "delay-free" else ("K", "T_so", "C0")
+        needed = ("K", "Lambda", "G_A") if delay_free else ("K", "T_so", "C0")
         for name in needed:
             if name not in design.blocks:
                 raise InputError(f"the block '{name}' is missing")
             if design.blocks[name].delay_s:
                 raise InputError(f"the block '{name}' has a dead time; expected none, the loop has the plant's")
-        for name in {*design.anti_windup, "thesis", "corrected"}:
-            design.compensator(name)
-        for name in ("bandwidth", "recovery_s"):
-            if not 1e-100 < number(design.anti_windup["corrected"], name) < 1e100:
+        corrected = design.corrected
+        for name, value in (("bandwidth", corrected.bandwidth), ("recovery_s", corrected.judgement.recovery_s)):
+            if not 1e-100 < value < 1e100:
                 raise InputError(f"'{name}' of the corrected anti-windup is not a positive number")
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return design
+
+
+def _named(anti_windups: Mapping[str, Named], name: str) -> Named:
+    """The anti-windup of this name; raises InputError when there is none."""
+    if name not in anti_windups:
+        raise InputError(f"there is no anti-windup '{name}'; the design has {', '.join(anti_windups)}")
+    return anti_windups[name]
 
 
 def _omegas(content: Mapping[str, Any]) -> tuple[float, ...]:

@@ -59,7 +59,7 @@ def simulate_command(
     import pandas as pd
 
     from data.thesis import model_named
-    from design.anti_windup.compensator import printed_form
+    from design.anti_windup.compensator import second_order
     from design.design_file import read_design
     from experiments.asked_reference import reference_of
     from experiments.engine.simulate import simulate
@@ -80,7 +80,8 @@ def simulate_command(
     content = read_design(design)
     kind = None if anti_windup == "none" else content.compensator(anti_windup)
     if numbers:
-        kind = printed_form({**content.anti_windup["thesis"], **numbers})
+        thesis = content.thesis
+        kind = second_order(**{"alpha": thesis.alpha, "beta": thesis.beta, "gamma": thesis.gamma} | numbers)
     # the quotient of two decimals may come out a rounding below a whole number
     time_s = sample_time * np.arange(int(until / sample_time * (1 + 1e-12)) + 1)
     limits, asked = (-limit, limit), reference_of(content, **reference)

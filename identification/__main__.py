@@ -14,7 +14,7 @@ from identification.base.files import write_whole
 from identification.model.plant import HIGHEST_ORDER
 
 
-class Counts(click.ParamType):
+class Counts(click.ParamType):  # type: ignore[type-arg]  # generic in the newest click only
     """``auto`` (None), a number of zeros and of poles such as 1/2, or one number for both."""
 
     name = "counts"

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from identification.bound.bound_residuals import BoundReport, bound_residuals
+from identification.bound.bound_residuals import bound_residuals
 from identification.fitting.fit_plant import FitResult, fit_plant
-from identification.fitting.subspace_check import SubspaceCheck, check_modes
+from identification.fitting.subspace_check import check_modes
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
+from identification.model.reports import BoundReport, SubspaceCheck
 from identification.model.structure import Wanted
-from identification.output.fit_facts import facts, standard_errors
+from identification.output.fit_facts import fit_record, standard_errors
 from identification.sweeps.response import FrequencyResponse, alias_free
 
 Tick = Callable[[], object]
@@ -68,7 +69,8 @@ def fit_model(
     checks = _checks(tests, plants, tick)
     clean = tuple(alias_free(test, result.plant) for test in tests)
     report = bound_residuals(result.plant, clean, plants, bound_order)
-    model = IdentifiedModel(result.plant, report.bound, standard_errors(result), facts(tests, result, report, checks))
+    record = fit_record(tests, result, report, checks)
+    model = IdentifiedModel(result.plant, report.bound, standard_errors(result), record)
     return ModelFit(model, result, report, checks, clean)
 
 

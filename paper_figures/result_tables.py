@@ -10,7 +10,7 @@ from traceback import walk_tb
 
 import pandas as pd
 
-from identification.base.errors import InputError
+from identification.base.errors import InputError, MissingFile
 from identification.base.files import read_text
 
 
@@ -26,11 +26,13 @@ def read_table(path: Path, figure: str = "summary") -> pd.DataFrame:
 
     Raises
     ------
+    MissingFile
+        There is no such file.
     InputError
-        The file is missing, is no table or has no rows.
+        The file is no table or has no rows.
     """
     if not path.is_file():
-        raise InputError(f"{path}: no such table, which {figure} needs")
+        raise MissingFile(f"{path}: no such table, which {figure} needs")
     try:
         table = pd.read_csv(StringIO(read_text(path)), comment="#")
     except (pd.errors.ParserError, pd.errors.EmptyDataError):

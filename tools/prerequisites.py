@@ -1,25 +1,28 @@
-"""The imports of the rooms -> build/prerequisites.mk, a make variable for each command with the files that it runs.
+"""The imports of the rooms -> build/prerequisites.mk, make variables with the files that each command hangs on.
 
-    CODE-ROOM-COMMAND    what `python -m ROOM COMMAND` imports
-    CODE-thesis-COMMAND  what `python -m experiments thesis COMMAND` imports
-    CODE-FIGURE          what the module of a figure imports
-    CODE-checks          what the functions that the ledger names import
+    CODE-ROOM-COMMAND    what `python -m ROOM COMMAND` runs and reads of the project's own
+    CODE-thesis-COMMAND  what `python -m experiments thesis COMMAND` does
+    CODE-FIGURE          what the module of a figure does
+    CODE-checks          what the functions that the ledger names do
+    TABLES-FIGURE        the tables that the figure draws
 
-An import inside a click command belongs to that command alone; every other one belongs to its module. Needs nothing
-but Python, since make asks before there is an environment.
+An import inside a click command belongs to that command alone; every other one belongs to its module, but for those
+that only type checkers read. A file belongs to the modules that name it: by its path, or by its name where it lies
+beside the module or in data/thesis. Needs nothing but Python, since make asks before there is an environment.
 """
 
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
 ROOMS = ("identification", "design", "experiments", "paper_figures")
-DATA = {"data/thesis/__init__.py": ("data/thesis/thesis.toml",)}
-CHECKS, FIGURES = "experiments/thesis/claims/checks", "paper_figures/thesis/figures"
+CHECKS, FIGURES = Path("experiments/thesis/claims/checks"), Path("paper_figures/thesis/figures")
+FILE_NAME = re.compile(r"\w[\w./-]*\.\w+")
 
 
 def files_of(module: str) -> list[str]:
@@ -32,17 +35,21 @@ def files_of(module: str) -> list[str]:
     return [path.as_posix() for path in found if path.is_file()]
 
 
-def imports(nodes: Iterable[ast.AST]) -> Iterator[str]:
-    """The files that import statements anywhere in these nodes name."""
-    for node in (below for top in nodes for below in ast.walk(top)):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names = [f"{node.module}.{alias.name}" for alias in node.names]
-        else:
-            continue
-        for name in names:
-            yield from files_of(name)
+def needs(node: ast.AST, folder: Path) -> Iterator[str]:
+    """The files that a statement of a module in this folder imports or names."""
+    if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+        return
+    if isinstance(node, ast.Import):
+        for alias in node.names:
+            yield from files_of(alias.name)
+    elif isinstance(node, ast.ImportFrom) and node.module:
+        for alias in node.names:
+            yield from files_of(f"{node.module}.{alias.name}")
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str) and FILE_NAME.fullmatch(node.value):
+        places = (place / node.value for place in (Path(), folder, Path("data/thesis")))
+        yield from (place.as_posix() for place in places if place.is_file())
+    for below in ast.iter_child_nodes(node):
+        yield from needs(below, folder)
 
 
 def command_name(node: ast.AST) -> str | None:
@@ -55,40 +62,53 @@ def command_name(node: ast.AST) -> str | None:
 
 @cache
 def read(file: str) -> tuple[frozenset[str], dict[str, frozenset[str]]]:
-    """What a module imports, and what each of its commands imports besides."""
-    body = ast.parse(Path(file).read_text(encoding="utf-8")).body
-    commands = {name: frozenset(imports([node])) for node in body if (name := command_name(node))}
-    return frozenset(imports(node for node in body if not command_name(node))), commands
+    """What a module needs, and what each of its commands needs besides."""
+    path = Path(file)
+    if path.suffix != ".py":
+        return frozenset(), {}
+    module, commands = set[str](), {}
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        found = frozenset(needs(node, path.parent))
+        if name := command_name(node):
+            commands[name] = found
+        else:
+            module |= found
+    return frozenset(module), commands
 
 
 def closure(files: Iterable[str]) -> list[str]:
-    """Files with all that they import, and what belongs to these that is no Python."""
-    met: set[str] = set()
-    left = list(files)
+    """Files with all that they need."""
+    met, left = set[str](), list(files)
     while left:
-        file = left.pop()
-        if file not in met:
+        if (file := left.pop()) not in met:
             met.add(file)
             left += read(file)[0]
-    folders = {Path(file).parent for file in met if file.startswith("paper_figures/")}
-    others = (path for folder in folders for path in folder.iterdir() if path.is_file() and path.suffix != ".py")
-    return sorted(met | {data for file in met for data in DATA.get(file, ())} | {path.as_posix() for path in others})
+    return sorted(met)
+
+
+def tables(figure: Path) -> list[str]:
+    """The names that a figure's module gives as its TABLES."""
+    for node in ast.parse(figure.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "TABLES" and node.value:
+            return list(ast.literal_eval(node.value))
+    raise SystemExit(f"{figure}: no TABLES; expected the names of the tables that it draws")
 
 
 def variables() -> dict[str, list[str]]:
-    """Each make variable with its files."""
+    """Each make variable with its words."""
     found = {}
     for room in ROOMS:
         for file in sorted(path.as_posix() for path in Path(room).rglob("*.py")):
             owner = "thesis" if file.startswith("experiments/thesis/") else room
             for name, own in read(file)[1].items():
                 found[f"CODE-{owner}-{name}"] = closure([*files_of(f"{room}.__main__"), file, *own])
-    for path in sorted(Path(FIGURES).glob("fig_*.py")):
+    for path in sorted(FIGURES.glob("fig_*.py")):
         found[f"CODE-{path.stem}"] = closure(files_of(".".join(path.with_suffix("").parts)))
-    found["CODE-checks"] = closure(path.as_posix() for path in Path(CHECKS).glob("*.py"))
+        found[f"TABLES-{path.stem}"] = tables(path)
+    found["CODE-checks"] = closure(path.as_posix() for path in CHECKS.glob("*.py"))
     return found
 
 
 if __name__ == "__main__":
-    text = "".join(f"{name} := {' '.join(files)}\n" for name, files in variables().items())
+    text = "".join(f"{name} := {' '.join(words)}\n" for name, words in variables().items())
     Path(sys.argv[1]).write_text(text, encoding="utf-8")

@@ -79,7 +79,7 @@ class Case:
             delay_s=self._delay(random),
         )
         size = abs(plant.gain) / self.slow
-        return IdentifiedModel(plant, _bound(random, self.rate, size), None, {})
+        return IdentifiedModel(plant, _bound(random, self.rate, size))
 
     def _delay(self, random: np.random.Generator) -> float:
         kind = random.choice(4, p=[0.15, 0.25, 0.35, 0.25])

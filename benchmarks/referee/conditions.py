@@ -46,7 +46,7 @@ def _apart(first: Any, second: Any, points: list[mpmath.mpc]) -> float:
 
 def _extended(case: Case, blocks: dict[str, Factors], points: list[mpmath.mpc]) -> list[Finding]:
     design = case.design
-    a, h = mp.mpf(design.parameters["a"]), mp.mpf(design.plant.delay_s)
+    a, h = mp.mpf(design.free.a), mp.mpf(design.plant.delay_s)
     T_so, C_0, Q, K = (blocks[name] for name in ("T_so", "C0", "Q", "K"))
     P = of_plant(design.plant)
 
@@ -66,7 +66,7 @@ def _extended(case: Case, blocks: dict[str, Factors], points: list[mpmath.mpc]) 
         ),
         Finding("Q of (4.2)", _apart(Q, lambda s: ((s + a) ** 2 * T_so(s) - a * (s + a)) / s, points), SAME),
     ]
-    epsilon = mp.mpf(design.parameters["inverse_epsilon"])
+    epsilon = mp.mpf(design.free.inverse_epsilon)
     findings.append(
         Finding("K of (3.29)", _apart(K, lambda s: T_so(s) / (P(s) * (1 + epsilon * s) ** 2), points), SAME)
     )
@@ -83,7 +83,7 @@ def _extended(case: Case, blocks: dict[str, Factors], points: list[mpmath.mpc]) 
 
 def _delay_free(case: Case, blocks: dict[str, Factors], points: list[mpmath.mpc]) -> list[Finding]:
     design = case.design
-    omega, slow = design.reference_omegas[0], float(np.sqrt(design.parameters["epsilon"]))
+    omega, slow = design.reference_omegas[0], float(np.sqrt(design.parameters.epsilon))
     P = of_plant(design.plant)
     Lambda, G_A = blocks["Lambda"], blocks["G_A"]
     missed = max(

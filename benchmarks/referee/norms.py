@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
@@ -13,7 +12,9 @@ from benchmarks.referee.factors import Factors, Loop, Real, of_block, of_bound
 from benchmarks.referee.nehari import optimum
 from benchmarks.referee.peaks import supremum
 from benchmarks.referee.winding import around, characteristic
+from design.anti_windup.judge import Compensator
 from design.design_file import Design
+from design.hinf.mixed_sensitivity import Synthesis
 
 PEAK = 1e-6  # relative: the project's peaks are refined to rounding, ours to better than this
 SECTOR = 5e-5  # of 1/k: half a unit of the last of four digits, as the audit prints it
@@ -24,25 +25,21 @@ NEAR_OPTIMAL = 0.01  # README: gamma_line is at most 1 % above gamma_line_lower
 def check(case: Case) -> list[Finding]:
     """f and the sector of every compensator, and what a delay-free design says of its stabiliser."""
     design = case.design
-    findings = [each for facts in design.anti_windup.values() for each in _compensator(case, facts)]
-    return findings + (_stabiliser(design) if design.hinf is not None else [])
+    findings = [each for of in design.anti_windup.values() for each in _compensator(case, of)]
+    return findings + (_stabiliser(design, design.hinf) if design.hinf is not None else [])
 
 
-def _compensator(case: Case, facts: Any) -> list[Finding]:
-    W_a, one_plus, theta = of_bound(case.model.additive_bound), *(_read(facts[n]) for n in ("one_plus", "theta1_tilde"))
+def _compensator(case: Case, of: Compensator) -> list[Finding]:
+    W_a = of_bound(case.model.additive_bound)
+    one_plus, theta = of_block(of.kind.one_plus), of_block(of.kind.theta1_tilde)
     product = W_a * one_plus
     f, _ = supremum(lambda at: np.abs(product(1j * at)), around(product.zeros + product.poles, 1.0))
-    sector = facts["popov_sector"]
+    sector = of.judgement.popov_sector
     claimed, own = 0.0 if sector is None else 1 / sector, _inverse_sector(theta)
     return [
-        Finding("f", abs(facts["f"] / f - 1), PEAK),
+        Finding("f", abs(of.judgement.f / f - 1), PEAK),
         Finding("Popov sector", abs(claimed - own) / max(own, claimed, 1e-3), SECTOR),
     ]
-
-
-def _read(block: Any) -> Factors:
-    roots = (tuple(complex(*root) for root in block[name]) for name in ("zeros", "poles"))
-    return Factors(float(block["gain"]), *roots)
 
 
 def _inverse_sector(theta: Factors) -> float:
@@ -79,25 +76,25 @@ def _inverse_sector(theta: Factors) -> float:
     return top * scale
 
 
-def _stabiliser(design: Design) -> list[Finding]:
+def _stabiliser(design: Design, hinf: Synthesis) -> list[Finding]:
     """Norms on the axis and on the line, the decay rate, and the lower bounds beside the optimum by Nehari."""
-    hinf: Any = design.hinf
     G, K = of_block(design.blocks["G_A"]), of_block(design.blocks["K"])
-    W1, W2 = of_block(hinf["W1"]), of_block(hinf["W2"])
-    rate = float(hinf["decay_rate"])
+    W1, W2 = of_block(hinf.W1), of_block(hinf.W2)
+    rate = hinf.decay_rate
     loop = Loop(G, K, Factors(0.0), 0.0, 0.0)
     right = characteristic(loop).count(-rate * (1 - 2e-3))
     findings = [Finding("poles right of -decay_rate", float(right), 0.5)]
     for name, shift in (("gamma", 0.0), ("gamma_line", -rate)):
         parts = [each.moved(shift) for each in (G, K, W1, W2)]
         norm = _norm(*parts)
-        best = optimum(parts[0], parts[2], parts[3], float(hinf[f"{name}_lower"]))
+        reached, lower = (getattr(hinf, f"{name}{end}") for end in ("", "_lower"))
+        best = optimum(parts[0], parts[2], parts[3], lower)
         findings += [
-            Finding(name, abs(hinf[name] / norm - 1), PEAK),
-            Finding(f"{name}_lower proved", max(0.0, hinf[f"{name}_lower"] / best - 1), PROVED),
+            Finding(name, abs(reached / norm - 1), PEAK),
+            Finding(f"{name}_lower proved", max(0.0, lower / best - 1), PROVED),
             Finding(f"{name} no less than the optimum", max(0.0, best / norm - 1), PROVED),
         ]
-    above = hinf["gamma_line"] / hinf["gamma_line_lower"] - 1
+    above = hinf.gamma_line / hinf.gamma_line_lower - 1
     findings.append(Finding("gamma_line over gamma_line_lower", above, NEAR_OPTIMAL))
     return findings
 

@@ -45,7 +45,7 @@ class Scaled(Case):
         """The model of the case in these units."""
         time, y, u = self.units
         model = case_of(self.seed, self.index).model
-        return IdentifiedModel(_plant(model.plant, time, y / u), _bound(model.additive_bound, time, y / u), None, {})
+        return IdentifiedModel(_plant(model.plant, time, y / u), _bound(model.additive_bound, time, y / u))
 
     @cached_property
     def options(self) -> dict[str, Any]:
@@ -146,15 +146,16 @@ def _audits(first: Design, second: Design, time: float) -> list[Finding]:
 def _facts(first: Design, second: Design, time: float) -> list[Finding]:
     findings = []
     for name in first.anti_windup:
-        a, b = (each.anti_windup[name] for each in (first, second))
+        a, b = (each.anti_windup[name].judgement for each in (first, second))
         scale = first.additive_bound.gain / second.additive_bound.gain  # f has the unit of W_a
-        findings.append(Finding(f"f ({name})", _apart(a["f"], b["f"] * scale), SAME))
-        sectors = [1 / each["popov_sector"] if each["popov_sector"] else 0.0 for each in (a, b)]
+        findings.append(Finding(f"f ({name})", _apart(a.f, b.f * scale), SAME))
+        sectors = [1 / each.popov_sector if each.popov_sector else 0.0 for each in (a, b)]
         findings.append(Finding(f"sector ({name})", _apart(*sectors, size=1e-3), SAME))
-        findings.append(Finding(f"recovery ({name})", _apart(a["recovery_s"], b["recovery_s"] / time), SAME))
+        findings.append(Finding(f"recovery ({name})", _apart(a.recovery_s, b.recovery_s / time), SAME))
     if first.hinf is not None and second.hinf is not None:
         for name in ("gamma", "gamma_lower", "gamma_line", "gamma_line_lower"):
-            findings.append(Finding(name, _apart(first.hinf[name], second.hinf[name]), 3e-4))  # the bisection's 1e-4
+            found = (getattr(hinf, name) for hinf in (first.hinf, second.hinf))
+            findings.append(Finding(name, _apart(*found), 3e-4))  # the bisection's 1e-4
     return findings
 
 

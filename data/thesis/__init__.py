@@ -7,7 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from identification.model.model_file import IdentifiedModel, bound_from_dict, plant_from_dict, read_model
+from identification.model.model_file import IdentifiedModel, read_model
+from identification.model.plant_json import bound_from_dict, plant_from_dict
 
 THESIS = Path(__file__).resolve().parent
 
@@ -35,9 +36,4 @@ def model_named(name: str) -> IdentifiedModel:
     plants = printed()["plants"]
     if name not in plants:
         return read_model(Path(name))
-    return IdentifiedModel(
-        plant=plant_from_dict(plants[name]),
-        additive_bound=bound_from_dict(printed()["additive_bound"]),
-        standard_errors=None,
-        fit={"source": f"thesis, parameter set '{name}'"},
-    )
+    return IdentifiedModel(plant_from_dict(plants[name]), bound_from_dict(printed()["additive_bound"]))

@@ -11,7 +11,7 @@ import numpy as np
 from design.blocks.block import Block, bound_block, from_polynomial, geometric_scale, plant_block, polynomial
 from design.blocks.frequency_peak import block_norm
 from identification.base.errors import InputError
-from identification.model.model_file import member, number
+from identification.base.json_object import member
 from identification.model.plant import AdditiveBound, PlantModel
 
 AT_ZERO = 1e-9  # |1 + theta1~(0)| below this, relative to what it is the difference of, is rounding
@@ -146,11 +146,6 @@ def second_order(alpha: float, beta: float, gamma: float) -> AntiWindup:
         theta1_tilde=Block(gamma / (alpha * beta), (), poles),
         one_plus=Block(1.0, (complex(far), complex(near)), poles),
     )
-
-
-def printed_form(numbers: Mapping[str, Any]) -> AntiWindup:
-    """theta1~ of (2.23) from the members alpha, beta, gamma of an object; raises InputError as they are missing."""
-    return second_order(number(numbers, "alpha"), number(numbers, "beta"), number(numbers, "gamma"))
 
 
 def uncertainty_cost(bound: AdditiveBound, one_plus: Block) -> tuple[float, float]:

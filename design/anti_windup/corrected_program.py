@@ -229,7 +229,7 @@ class CorrectedProgram:
         bounds = -totals[:, 0] - loss[..., 0]
         if contradicts:
             bounds[limits[:, -1] + totals[:, 1] + loss[..., 1] < 0] = np.inf
-        return self.size * bounds
+        return np.asarray(self.size * bounds)
 
     def compensator(self, rate: float, b: float, x: Real) -> AntiWindup:
         """theta1~ and 1 + theta1~ with these poles and coefficients."""

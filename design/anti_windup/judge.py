@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from design.anti_windup.popov import popov_sector, robust_loss, robust_popov_sec
 from design.anti_windup.thesis_compensator import thesis_choice
 from design.blocks.block import Block, bound_block, fastest_root, plant_block
 from design.choices import SECTOR
-from identification.model.model_file import IdentifiedModel
-from identification.model.plant import PlantModel
+from identification.base.json_object import Reader, record
+from identification.model.plant import AdditiveBound, PlantModel
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,73 @@ class Judgement:
     recovery_s: float
 
 
-def judge(model: IdentifiedModel, kind: AntiWindup) -> Judgement:
+@dataclass(frozen=True)
+class Compensator:
+    """One anti-windup of a design.
+
+    Parameters
+    ----------
+    kind
+        theta1~.
+    judgement
+        What it is worth for the plant as the design sees it.
+    """
+
+    kind: AntiWindup
+    judgement: Judgement
+
+    def to_dict(self) -> dict[str, Any]:
+        """What was chosen, both blocks and the judgement, as design.json holds them."""
+        chosen = {name: value for name, value in vars(self).items() if name not in ("kind", "judgement")}
+        return chosen | self.kind.to_dict() | asdict(self.judgement)
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """Read what :meth:`to_dict` writes; raises InputError when it is not of that form."""
+        readers: dict[str, Reader] = {
+            "AntiWindup": lambda members, _: AntiWindup.from_dict(members),
+            "Judgement": lambda members, _: record(Judgement, members),
+        }
+        return record(cls, content, readers)
+
+
+@dataclass(frozen=True)
+class PrintedCompensator(Compensator):
+    """The thesis's.
+
+    Parameters
+    ----------
+    alpha, beta, gamma
+        Of (2.23); the time constants in seconds.
+    """
+
+    alpha: float
+    beta: float
+    gamma: float
+
+
+@dataclass(frozen=True)
+class CorrectedCompensator(Compensator):
+    """That of :func:`design.anti_windup.corrected_compensator.corrected`.
+
+    Parameters
+    ----------
+    sector
+        Of the circle criterion, which it was asked to meet.
+    bandwidth
+        In rad/s; no pole of theta1~ lies beyond.
+    f_lower
+        As of :class:`design.anti_windup.corrected_compensator.Corrected`.
+    """
+
+    sector: float
+    bandwidth: float
+    f_lower: float
+
+
+def judge(plant: PlantModel, bound: AdditiveBound, kind: AntiWindup) -> Judgement:
     """Judge one anti-windup compensator for a plant and its bound."""
-    f, f_omega = uncertainty_cost(model.additive_bound, kind.one_plus)
+    f, f_omega = uncertainty_cost(bound, kind.one_plus)
     sector, multiplier = popov_sector(kind.theta1_tilde)
     slowest = min((-pole.real for pole in kind.one_plus.poles), default=np.inf)
     return Judgement(
@@ -65,8 +129,8 @@ def judge(model: IdentifiedModel, kind: AntiWindup) -> Judgement:
         popov_sector=sector if np.isfinite(sector) else None,
         popov_multiplier_s=multiplier,
         theta1_tilde_at_zero=float(kind.theta1_tilde(0j).real),
-        theta2_stable=kind.theta2(model.plant).is_stable,
-        lasting_offset=lasting_offset(model.plant, kind),
+        theta2_stable=kind.theta2(plant).is_stable,
+        lasting_offset=lasting_offset(plant, kind),
         recovery_s=float(np.log(1 / SETTLED)) / slowest,
     )
 
@@ -109,18 +173,19 @@ def robust_sector(
 
 
 def compensators(
-    model: IdentifiedModel,
+    plant: PlantModel,
+    bound: AdditiveBound,
     own_s: float,
     recovery_s: float | None = None,
     sector: float = SECTOR,
     bandwidth: float | None = None,
-) -> dict[str, dict[str, Any]]:
-    """The ``anti_windup`` member of design.json: the thesis's and the corrected compensator, each with its judgement.
+) -> tuple[PrintedCompensator, CorrectedCompensator]:
+    """The thesis's and the corrected compensator, each with its judgement.
 
     Parameters
     ----------
-    model
-        Plant and W_a.
+    plant, bound
+        P and W_a.
     own_s
         Time in seconds in which the design's own transients fall to 1 %.
     recovery_s, sector
@@ -129,7 +194,7 @@ def compensators(
         faster than the loop may have a smaller f, and answers a saturation with a control many times the limits.
     bandwidth
         Of the corrected compensator in rad/s; unless given, that of the fastest root of the plant and of W_a, which is
-        as far as the model says anything, and at least ten times the rate ln(100)/own_s. It does not depend on
+        as far as they say anything, and at least ten times the rate ln(100)/own_s. It does not depend on
         ``recovery_s``, so that f does not increase with it.
 
     Raises
@@ -137,20 +202,16 @@ def compensators(
     InputError
         A number is out of its range, or no corrected compensator meets the sector.
     """
-    bound = model.additive_bound
     alpha, beta, gamma = thesis_choice(bound)
     if bandwidth is None:
-        fastest = fastest_root(plant_block(model.plant), bound_block(bound))
+        fastest = fastest_root(plant_block(plant), bound_block(bound))
         bandwidth = max(fastest, 10 * float(np.log(1 / SETTLED)) / own_s)
-    unstable, pace = plant_block(model.plant).unstable_poles, own_s if recovery_s is None else recovery_s
+    unstable, pace = plant_block(plant).unstable_poles, own_s if recovery_s is None else recovery_s
     found = corrected(unstable, bound, pace, sector, bandwidth, faster=recovery_s is not None)
-    return {
-        "thesis": {"alpha": alpha, "beta": beta, "gamma": gamma} | facts(model, second_order(alpha, beta, gamma)),
-        "corrected": {"sector": sector, "bandwidth": bandwidth, "f_lower": found.f_lower}
-        | facts(model, found.anti_windup),
-    }
-
-
-def facts(model: IdentifiedModel, kind: AntiWindup) -> dict[str, Any]:
-    """A compensator as design.json holds it: both blocks and what :func:`judge` says."""
-    return kind.to_dict() | asdict(judge(model, kind))
+    printed = second_order(alpha, beta, gamma)
+    return (
+        PrintedCompensator(printed, judge(plant, bound, printed), alpha, beta, gamma),
+        CorrectedCompensator(
+            found.anti_windup, judge(plant, bound, found.anti_windup), sector, bandwidth, found.f_lower
+        ),
+    )

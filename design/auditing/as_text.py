@@ -59,7 +59,7 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
     without = ", for the plant without its dead time" if found.with_delay is not None else ""
     lines += ["", f"Anti-windup{without}", *_columns(_anti_windup_rows(found, windup))]
     alpha, beta, gamma, f = found.least_f
-    bandwidth = design.anti_windup["corrected"]["bandwidth"]
+    bandwidth = design.corrected.bandwidth
     lines += [
         "",
         f"The best found of (2.23) with no pole beyond {bandwidth:g} rad/s: alpha = {alpha:.4g} s, "

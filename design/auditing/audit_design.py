@@ -15,12 +15,12 @@ from design.blocks.frequency_peak import frequency_grid
 from design.chapters_3_4.smith_predictor import anti_windup_controller, smith_controller, stabiliser
 from design.design_file import Design
 from design.hinf.mixed_sensitivity import Infimum, Synthesis, assess, infimum
+from design.parameters import ExtendedParameters
 from design.stability.axis import HALVE, NO_ZERO, cells, first_edges
 from design.stability.characteristic_roots import CharacteristicRoots, largest_beyond, rightmost_roots
 from design.stability.jet import jet
 from design.stability.margins import Margins, delay_loop, margins_of, responses, tracking_floor
 from identification.base.errors import InputError
-from identification.model.model_file import IdentifiedModel, number
 from identification.model.plant import AdditiveBound, PlantModel
 
 Result = TypeVar("Result")
@@ -80,7 +80,6 @@ def audit(design: Design) -> Audit:
     """
     _require_consistent(design)
     plant, bound = design.loop_plant, design.additive_bound
-    model = IdentifiedModel(plant, bound, None, {})
     forward, feedback = design.controller_parts()
     loop = delay_loop(design, plant)
     margins = _attempt(lambda: margins_of(loop, bound))
@@ -94,19 +93,20 @@ def audit(design: Design) -> Audit:
         return np.asarray(np.abs(bound(1j * omega) * responses(loop, omega)[1]))
 
     same = None
-    if design.kind == "extended" and not design.parameters.get("inverse_epsilon"):
+    chosen = design.parameters
+    if isinstance(chosen, ExtendedParameters) and not chosen.inverse_epsilon:
         s = 1j * frequency_grid(shapes, per_decade=20)
-        s = s[np.abs(s) > 1e-2 * number(design.parameters, "a")]  # below, both are differences that vanish
+        s = s[np.abs(s) > 1e-2 * chosen.a]  # below, both are differences that vanish
         C_s = smith_controller(plant, design.blocks["C0"], s)
         same = float(np.max(np.abs(anti_windup_controller(plant, forward, feedback, s) / C_s - 1)))
     reached = interval = None
     if design.hinf is not None:
-        G_A, K, W1, W2 = design.blocks["G_A"], design.blocks["K"], design.hinf["W1"], design.hinf["W2"]
-        decay_rate = number(design.hinf, "decay_rate")
+        G_A, K = design.blocks["G_A"], design.blocks["K"]
+        W1, W2, decay_rate = design.hinf.W1, design.hinf.W2, design.hinf.decay_rate
         reached = _attempt(lambda: assess(G_A, W1, W2, K, decay_rate))
         interval = _attempt(lambda: infimum(G_A, W1, W2, decay_rate))
     guaranteed = isinstance(margins, Margins) and margins.is_guaranteed
-    kinds = {name: design.compensator(name) for name in design.anti_windup}
+    kinds = {name: each.kind for name, each in design.anti_windup.items()}
     sectors = {name: robust_sector(kind, robustness, shapes) if guaranteed else 0.0 for name, kind in kinds.items()}
     delayed = None
     if plant != design.plant:
@@ -120,9 +120,9 @@ def audit(design: Design) -> Audit:
         same_controller=same,
         stabiliser=reached,
         infimum=interval,
-        anti_windup={name: judge(model, kind) for name, kind in kinds.items()},
+        anti_windup={name: judge(plant, bound, kind) for name, kind in kinds.items()},
         robust_sector=sectors,
-        least_f=least_f(bound, number(design.anti_windup["corrected"], "bandwidth")),
+        least_f=least_f(bound, design.corrected.bandwidth),
     )
 
 
@@ -137,11 +137,10 @@ def _attempt(compute: Callable[[], Result]) -> Result | str:
 def _require_consistent(design: Design) -> None:
     """Refuse blocks that do not follow from the plant and from each other, (2.6) or (3.29)."""
     plant, blocks = design.loop_plant, design.blocks
-    if design.kind == "delay-free":
-        expected, found = plant_numerator(plant) * blocks["Lambda"].inverse(), blocks["G_A"]
+    if isinstance(design.parameters, ExtendedParameters):
+        expected, found = stabiliser(plant, blocks["T_so"], design.parameters.inverse_epsilon)[2], blocks["K"]
     else:
-        epsilon = float(design.parameters.get("inverse_epsilon", 0.0))
-        expected, found = stabiliser(plant, blocks["T_so"], epsilon)[2], blocks["K"]
+        expected, found = plant_numerator(plant) * blocks["Lambda"].inverse(), blocks["G_A"]
     s = geometric_scale(expected) * np.array([0.1, 1.0 + 0.5j, 7.0])
     if not np.allclose(found(s), expected(s), rtol=1e-6, atol=0.0):
         raise InputError("the blocks do not belong to the plant; expected a design that 'python -m design' wrote")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from identification.base.arrays import Complex
 from identification.base.errors import InputError
-from identification.model.model_file import number
+from identification.base.json_object import number
 from identification.model.plant import AdditiveBound, Mode, PlantModel
 from identification.model.python_control import from_control, to_control
 

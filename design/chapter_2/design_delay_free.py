@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from design.anti_windup.compensator import printed_form
 from design.anti_windup.corrected_compensator import SETTLED
 from design.anti_windup.judge import compensators
 from design.blocks.block import Block, bound_block, plant_denominator, plant_numerator, require_thesis_class
@@ -15,18 +14,21 @@ from design.choices import SECTOR
 from design.design_file import Design
 from design.hinf.mixed_sensitivity import mixed_sensitivity
 from design.hinf.pick import Problem
+from design.parameters import DelayFreeParameters
 from identification.base.errors import InputError
-from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, PlantModel
 
 TRACKING = 0.01  # W1 asks for |S| below gamma times this at the reference's frequencies
 
 
-def stabiliser_problem(model: IdentifiedModel, period_s: float, epsilon: float) -> tuple[InternalModel, Problem]:
+def stabiliser_problem(
+    plant: PlantModel, bound: AdditiveBound, period_s: float, epsilon: float
+) -> tuple[InternalModel, Problem]:
     """The internal model units, and what the stabiliser K has to minimise.
 
     Parameters
     ----------
-    model, period_s, epsilon
+    plant, bound, period_s, epsilon
         As for :func:`design_delay_free`.
 
     Raises
@@ -47,11 +49,11 @@ def stabiliser_problem(model: IdentifiedModel, period_s: float, epsilon: float) 
     """
     if not (math.isfinite(period_s) and period_s > 0):
         raise InputError(f"the period is {period_s:g} s; expected a positive number")
-    plant = model.plant.without_delay()
+    plant = plant.without_delay()
     require_thesis_class(plant)
     omega = 2 * math.pi / period_s
     units = internal_model(plant, omega, epsilon)
-    A, B, W_a = plant_denominator(plant), plant_numerator(plant), bound_block(model.additive_bound)
+    A, B, W_a = plant_denominator(plant), plant_numerator(plant), bound_block(bound)
     slowest = min(-root.real for root in A.zeros + B.zeros + W_a.poles if root != 0)
     decay_rate = min(math.log(1 / SETTLED) / period_s, slowest / 2)
 
@@ -65,7 +67,8 @@ def stabiliser_problem(model: IdentifiedModel, period_s: float, epsilon: float) 
 
 
 def design_delay_free(
-    model: IdentifiedModel,
+    plant: PlantModel,
+    bound: AdditiveBound,
     period_s: float,
     epsilon: float,
     recovery_s: float | None = None,
@@ -76,8 +79,8 @@ def design_delay_free(
 
     Parameters
     ----------
-    model
-        Plant (its dead time is ignored, as the thesis does) and W_a.
+    plant, bound
+        P (its dead time is ignored, as the thesis does) and W_a.
     period_s
         Period of the sinusoidal reference in seconds.
     epsilon
@@ -99,37 +102,27 @@ def design_delay_free(
     C = K A/Lambda has a zero at the plant's pole s = 0 (A(0) = 0; Lemma 1 assumes a stable A): the integrator is
     hidden from the loop and not stabilised, so that a constant disturbance at the plant's input makes y drift.
     """
-    units, problem = stabiliser_problem(model, period_s, epsilon)
-    W1, W2, decay_rate = problem.W1, problem.W2, problem.decay_rate
-    synthesis = mixed_sensitivity(problem.G, W1, W2, decay_rate)
-    anti_windup = compensators(model, math.log(1 / SETTLED) / (2 * decay_rate), recovery_s, sector, bandwidth)
-    thesis = printed_form(anti_windup["thesis"])
+    units, problem = stabiliser_problem(plant, bound, period_s, epsilon)
+    K, synthesis = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
+    own_s = math.log(1 / SETTLED) / (2 * problem.decay_rate)
+    thesis, corrected = compensators(plant, bound, own_s, recovery_s, sector, bandwidth)
     return Design(
         kind="delay-free",
-        plant=model.plant,
-        additive_bound=model.additive_bound,
+        plant=plant,
+        additive_bound=bound,
         reference_omegas=(2 * math.pi / period_s,),
         blocks={
             "Lambda": units.Lambda,
             "F1": units.F1,
             "F2": units.F2,
             "G_A": units.G_A,
-            "K": synthesis.K,
-            "theta1_tilde": thesis.theta1_tilde,
-            "theta1": thesis.theta1_tilde * units.one_plus_F,  # Eq. (2.17)
-            "theta2": thesis.theta2(model.plant.without_delay()),  # Eq. (2.18)
+            "K": K,
+            "theta1_tilde": thesis.kind.theta1_tilde,
+            "theta1": thesis.kind.theta1_tilde * units.one_plus_F,  # Eq. (2.17)
+            "theta2": thesis.kind.theta2(plant.without_delay()),  # Eq. (2.18)
         },
-        hinf={
-            "gamma_lower": synthesis.gamma_lower,
-            "reason": synthesis.reason,
-            "gamma": synthesis.gamma,
-            "decay_rate": decay_rate,
-            "gamma_line_lower": synthesis.gamma_line_lower,
-            "line_reason": synthesis.line_reason,
-            "gamma_line": synthesis.gamma_line,
-            "W1": W1,
-            "W2": W2,
-        },
-        anti_windup=anti_windup,
-        parameters={"period_s": period_s, "epsilon": epsilon},
+        hinf=synthesis,
+        parameters=DelayFreeParameters(period_s, epsilon),
+        thesis=thesis,
+        corrected=corrected,
     )

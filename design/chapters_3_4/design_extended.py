@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
-from design.anti_windup.compensator import printed_form
 from design.anti_windup.corrected_compensator import SETTLED
 from design.anti_windup.judge import compensators
 from design.blocks.block import Block, plant_block, plant_denominator, plant_numerator
@@ -16,12 +14,14 @@ from design.chapters_3_4.robust_roll_off import robust_free_part
 from design.chapters_3_4.smith_predictor import free_part, stabiliser
 from design.choices import SECTOR
 from design.design_file import Design
+from design.parameters import ExtendedParameters, Quotient, RollOff
 from identification.base.errors import InputError
-from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, PlantModel
 
 
 def design_extended(
-    model: IdentifiedModel,
+    plant: PlantModel,
+    bound: AdditiveBound,
     reference_omegas: Sequence[float],
     a: float,
     pairs: Sequence[tuple[float, float]],
@@ -39,8 +39,8 @@ def design_extended(
 
     Parameters
     ----------
-    model
-        Plant with its dead time, and W_a.
+    plant, bound
+        P with its dead time, and W_a.
     reference_omegas
         Angular frequencies of the reference in rad/s; 0 is a constant.
     a
@@ -64,18 +64,13 @@ def design_extended(
         A number is out of its range, the method gives an unstable Q, the level cannot be met, or the plant is not of
         the class.
     """
-    wanted = conditions(reference_omegas, model.plant.delay_s, a)
+    wanted = conditions(reference_omegas, plant.delay_s, a)
     designs = {
         "zeros": lambda: by_zeros(wanted, pairs),
         "lagrange": lambda: lagrange(wanted),
         "poles": lambda: by_poles(wanted),
     }
-    parameters: dict[str, Any] = {
-        "a": a,
-        "pairs": [list(pair) for pair in pairs],
-        "method": method,
-        "inverse_epsilon": inverse_epsilon,
-    }
+    roll_off = None
     if robust_level is None:
         free = free_part(designs[method](), a)
     elif method != "zeros" or inverse_epsilon:
@@ -83,46 +78,49 @@ def design_extended(
             "the robust redesign is by the zeros of Q with the exact inverse; found another method or epsilon"
         )
     else:
-        redesign = robust_free_part(model, wanted, pairs, robust_level)
-        free = redesign.free
-        parameters |= {"robust_level": robust_level, "roll_off_order": redesign.order}
-        if redesign.order:
-            parameters["roll_off"] = redesign.rate
-    parameters["Q"] = {name: _attempt(design) for name, design in designs.items()}
+        redesign = robust_free_part(plant, bound, wanted, pairs, robust_level)
+        free, roll_off = redesign.free, RollOff(robust_level, redesign.order, redesign.rate)
 
-    K_0, K_1, K = stabiliser(model.plant, free.T_so, inverse_epsilon)
-    F1 = plant_block(model.plant)
+    K_0, K_1, K = stabiliser(plant, free.T_so, inverse_epsilon)
+    F1 = plant_block(plant)
     # W_aw/(K R_0) with W_aw = -s T_so, Eq. (3.16), (3.17), (3.21), (3.29); it is -C_s S_s, (3.23)
-    F2 = (free.T_so * plant_denominator(model.plant) * plant_numerator(model.plant).inverse()).scaled(-1.0)
-    anti_windup = compensators(model, float(np.log(1 / SETTLED)) / a, recovery_s, sector, bandwidth)
-    thesis = printed_form(anti_windup["thesis"])
+    F2 = (free.T_so * plant_denominator(plant) * plant_numerator(plant).inverse()).scaled(-1.0)
+    thesis, corrected = compensators(plant, bound, float(np.log(1 / SETTLED)) / a, recovery_s, sector, bandwidth)
     return Design(
         kind="extended",
-        plant=model.plant,
-        additive_bound=model.additive_bound,
+        plant=plant,
+        additive_bound=bound,
         reference_omegas=tuple(float(omega) for omega in reference_omegas),
         blocks={
             "Q": free.Q,
             "C0": free.C_0,
             "T_so": free.T_so,
-            "F": Block(-free.T_so.gain, free.T_so.zeros, free.T_so.poles, model.plant.delay_s),
+            "F": Block(-free.T_so.gain, free.T_so.zeros, free.T_so.poles, plant.delay_s),
             "F1": F1,
             "F2": F2,
             "K0": K_0,
             "K1": K_1,
             "K": K,
-            "theta1_tilde": thesis.theta1_tilde,
-            "theta2": thesis.theta2(model.plant),
+            "theta1_tilde": thesis.kind.theta1_tilde,
+            "theta2": thesis.kind.theta2(plant),
         },
         hinf=None,
-        anti_windup=anti_windup,
-        parameters=parameters,
+        parameters=ExtendedParameters(
+            a=a,
+            pairs=tuple((e, f) for e, f in pairs),
+            method=method,
+            inverse_epsilon=inverse_epsilon,
+            Q={name: _attempt(design) for name, design in designs.items()},
+            roll_off=roll_off,
+        ),
+        thesis=thesis,
+        corrected=corrected,
     )
 
 
-def _attempt(design: Callable[[], StableFunction]) -> dict[str, Any]:
+def _attempt(design: Callable[[], StableFunction]) -> Quotient | str:
     try:
         found = design()
     except InputError as error:
-        return {"refused": str(error)}
-    return {"numerator": list(found.numerator), "denominator": found.denominator.tolist()}
+        return str(error)
+    return Quotient(found.numerator, tuple(found.denominator.tolist()))

@@ -13,7 +13,7 @@ from design.chapters_3_4.interpolate_Q import Conditions
 from design.chapters_3_4.smith_predictor import FreePart, rolled_off, stabiliser
 from design.stability.margins import tracking_floor
 from identification.base.errors import InputError
-from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, PlantModel
 
 MOST_POLES = 3  # of the roll-off, beyond what the plant's own excess of poles takes
 PER_DECADE = 10
@@ -43,14 +43,18 @@ class Redesign:
 
 
 def robust_free_part(
-    model: IdentifiedModel, wanted: Conditions, pairs: Sequence[tuple[float, float]], level: float
+    plant: PlantModel,
+    bound: AdditiveBound,
+    wanted: Conditions,
+    pairs: Sequence[tuple[float, float]],
+    level: float,
 ) -> Redesign:
     """The latest roll-off found of T_so with ||W_a C S|| <= level: the loop around every plant within W_a is stable.
 
     Parameters
     ----------
-    model
-        Plant with its dead time, and W_a.
+    plant, bound
+        P with its dead time, and W_a.
     wanted, pairs
         As for :func:`design.chapters_3_4.smith_predictor.rolled_off`.
     level
@@ -73,18 +77,18 @@ def robust_free_part(
     """
     if not 0 < level < 1:
         raise InputError(f"the level of |W_a C S| is {level:g}; expected between 0 and 1")
-    floor = tracking_floor(model.plant, model.additive_bound, (0.0, *wanted.omegas))
+    floor = tracking_floor(plant, bound, (0.0, *wanted.omegas))
     if floor >= level:
         raise InputError(
             f"|W_a/P| is {floor:.4g} at a frequency of the reference, and so is |W_a C S| for every controller that "
             f"follows it; expected less than the level {level:g}"
         )
-    excess = plant_block(model.plant).relative_degree - 1
-    W_a = bound_block(model.additive_bound)
+    excess = plant_block(plant).relative_degree - 1
+    W_a = bound_block(bound)
 
     def attempt(rate: float, order: int) -> Redesign:
         free = rolled_off(wanted, pairs, rate, order)
-        product = W_a * stabiliser(model.plant, free.T_so)[2]
+        product = W_a * stabiliser(plant, free.T_so)[2]
         robustness, _ = searched_norm(product)
         T = Block(free.T_so.gain, free.T_so.zeros, free.T_so.poles, wanted.delay_s)
         sensitivity, _ = peak(lambda omega: np.abs(1 - T(1j * omega)), T.zeros + T.poles)
@@ -92,7 +96,7 @@ def robust_free_part(
 
     met: list[Redesign] = []
     best = np.inf
-    fast, slow = _ends(model, wanted)
+    fast, slow = _ends(plant, bound, wanted)
     rates = np.geomspace(fast, slow, int(PER_DECADE * np.log10(fast / slow)) + 2)
     for order in range(excess, excess + MOST_POLES + 1):
         above = None
@@ -101,7 +105,7 @@ def robust_free_part(
             best = min(best, found.peak)
             if found.peak <= level * (1 - CERTIFIED):
                 latest = found if above is None else _latest(attempt, found, above, level * (1 - CERTIFIED))
-                proved, _ = block_norm(W_a * stabiliser(model.plant, latest.free.T_so)[2])
+                proved, _ = block_norm(W_a * stabiliser(plant, latest.free.T_so)[2])
                 if proved <= level * (1 - CERTIFIED):
                     met.append(latest)
                 break
@@ -114,9 +118,9 @@ def robust_free_part(
     )
 
 
-def _ends(model: IdentifiedModel, wanted: Conditions) -> tuple[float, float]:
+def _ends(plant: PlantModel, bound: AdditiveBound, wanted: Conditions) -> tuple[float, float]:
     """A decade above the fastest root of plant and W_a, and a hundredth of the slowest of what T_so already has."""
-    fastest = fastest_root(plant_block(model.plant), bound_block(model.additive_bound))
+    fastest = fastest_root(plant_block(plant), bound_block(bound))
     return 10 * max(fastest, wanted.a), min((wanted.a, *wanted.omegas)) / 100
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from design.blocks.ball import shared
 from design.blocks.block import Block
@@ -11,6 +13,7 @@ from design.hinf.central_controller import central_controller
 from design.hinf.closed_loop_norm import closed_loop_norm, closed_loop_poles
 from design.hinf.pick import Obstacle, Problem, SynthesisError, is_feasible
 from identification.base.errors import InputError
+from identification.base.json_object import member, record
 
 SUBOPTIMALITY = 0.01  # the controller is the central one this far above what is proved infeasible
 ROUNDING = 1e-4  # of the suboptimality, left for the rounding of the controller to doubles
@@ -21,28 +24,25 @@ TIGHT = 0.01  # the infimum is known when lower and upper are this near, relativ
 
 @dataclass(frozen=True)
 class Synthesis:
-    """A stabilising controller with a prescribed decay rate, and what can be said about the optimum.
+    """What can be said about a stabilising controller K with a prescribed decay rate, and about the optimum.
 
     Parameters
     ----------
-    K
-        Controller, u = K (r - y), strictly proper when W1 is.
     gamma_lower
         No stabilising controller of these blocks reaches this norm (2.8), whatever its decay rate: proved in ball
         arithmetic, no rounding excepted.
     reason
         Why: the test that fails at ``gamma_lower``, with its margin.
     gamma
-        A bound on the norm (2.8) that ``K`` reaches, of :func:`design.hinf.closed_loop_norm.closed_loop_norm`.
+        A bound on the norm (2.8) that K reaches, of :func:`design.hinf.closed_loop_norm.closed_loop_norm`.
     decay_rate
         In 1/s; every closed-loop pole lies left of -decay_rate.
     gamma_line_lower, line_reason, gamma_line
         The same three on the line Re s = -decay_rate, where ``gamma_line`` is at most 1 % above ``gamma_line_lower``.
-    closed_loop_poles
-        In rad/s.
+    W1, W2
+        The weights.
     """
 
-    K: Block
     gamma_lower: float
     reason: str
     gamma: float
@@ -50,7 +50,17 @@ class Synthesis:
     gamma_line_lower: float
     line_reason: str
     gamma_line: float
-    closed_loop_poles: tuple[complex, ...]
+    W1: Block
+    W2: Block
+
+    def to_dict(self) -> dict[str, Any]:
+        """The ``hinf`` object of design.json."""
+        return {**vars(self), "W1": self.W1.to_dict(), "W2": self.W2.to_dict()}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Synthesis:
+        """Read what :meth:`to_dict` writes; raises InputError when a member is missing or of the wrong form."""
+        return record(cls, content, {"Block": lambda members, key: Block.from_dict(member(members, key))})
 
 
 @dataclass(frozen=True)
@@ -73,7 +83,7 @@ class Infimum:
     decay_rate: float
 
 
-def mixed_sensitivity(G: Block, W1: Block, W2: Block, decay_rate: float) -> Synthesis:
+def mixed_sensitivity(G: Block, W1: Block, W2: Block, decay_rate: float) -> tuple[Block, Synthesis]:
     """Minimise || [W1 S; W2 T] ||_inf over the controllers that stabilise G with a decay rate, Thesis Eq. (2.8).
 
     Parameters
@@ -88,6 +98,13 @@ def mixed_sensitivity(G: Block, W1: Block, W2: Block, decay_rate: float) -> Synt
     decay_rate
         In 1/s, not negative. With 0 it is (2.8) itself that is solved, and the two bounds on it are those on the
         line.
+
+    Returns
+    -------
+    K
+        Controller, u = K (r - y), strictly proper when W1 is.
+    synthesis
+        What can be said of it.
 
     Raises
     ------
@@ -109,7 +126,7 @@ def mixed_sensitivity(G: Block, W1: Block, W2: Block, decay_rate: float) -> Synt
     """
     problem = Problem(G, W1, W2, decay_rate)
     K, bound = _synthesise(problem, SUBOPTIMALITY)
-    return _assess(problem, K, bound)
+    return K, _assess(problem, K, bound)
 
 
 def assess(G: Block, W1: Block, W2: Block, K: Block, decay_rate: float) -> Synthesis:
@@ -136,8 +153,7 @@ def assess(G: Block, W1: Block, W2: Block, K: Block, decay_rate: float) -> Synth
 
 def _assess(problem: Problem, K: Block, line_bound: Obstacle) -> Synthesis:
     G, W1, W2, decay_rate = problem.G, problem.W1, problem.W2, problem.decay_rate
-    poles = closed_loop_poles(G, K)
-    slowest = max(pole.real for pole in poles)
+    slowest = max(pole.real for pole in closed_loop_poles(G, K))
     if slowest >= -decay_rate:
         raise SynthesisError(
             f"with K a closed-loop pole lies at Re s = {slowest:.6g}; expected all of them left of {0 - decay_rate:.6g}"
@@ -146,7 +162,9 @@ def _assess(problem: Problem, K: Block, line_bound: Obstacle) -> Synthesis:
     bound, norm = line_bound, line
     if decay_rate > 0:
         bound, norm = _bisect(Problem(G, W1, W2, 0.0)), closed_loop_norm(G, W1, W2, K)
-    return Synthesis(K, bound.gamma, bound.reason, norm, decay_rate, line_bound.gamma, line_bound.reason, line, poles)
+    return Synthesis(
+        bound.gamma, bound.reason, norm, decay_rate, line_bound.gamma, line_bound.reason, line, W1=W1, W2=W2
+    )
 
 
 def infimum(G: Block, W1: Block, W2: Block, decay_rate: float) -> Infimum:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from identification.base.errors import InputError
+from identification.base.errors import InputError, MissingFile
 
 RUNS = ("none", "thesis", "corrected")
 MEASURES = {"peak_error": "peak_error_{}", "steady_error": "steady_error_{}", "recovery_s": "recovery_{}_s"}
@@ -122,7 +122,7 @@ def _open(path: Path) -> Any:
     from pyarrow import parquet
 
     if not path.is_file():
-        raise InputError(f"{path}: no such file")
+        raise MissingFile(f"{path}: no such file")
     try:
         return parquet.ParquetFile(path)
     except (pyarrow.ArrowException, OSError):

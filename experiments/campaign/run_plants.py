@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -217,19 +216,8 @@ class _Runner:
 
 def parameters(plant: PlantModel) -> dict[str, float]:
     """The numbers of a plant, named: gain, delay_s, zero_omega_1, zero_zeta_1, ..., real_zero_1, ..."""
-    modes = {"zero": plant.zero_modes, "pole": plant.pole_modes}
-    rates = {"real_zero": plant.real_zeros, "real_pole": plant.real_poles}
-    return {"gain": plant.gain, "delay_s": plant.delay_s} | dict(
-        chain(
-            (
-                (f"{name}_{what}_{k}", float(getattr(mode, what)))
-                for name, of in modes.items()
-                for k, mode in enumerate(of, start=1)
-                for what in ("omega", "zeta")
-            ),
-            ((f"{name}_{k}", rate) for name, of in rates.items() for k, rate in enumerate(of, start=1)),
-        )
-    )
+    found = {parameter.name: float(parameter.value) for parameter in plant.parameters}
+    return {"gain": plant.gain, "delay_s": plant.delay_s} | found
 
 
 def _number(value: float) -> float | None:

@@ -141,4 +141,4 @@ def absolute_integral(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """The integrals of |chord from left to right| over intervals of length 1, shape (n,) as the ends have."""
     size = np.abs(left) + np.abs(right)
     crossing = left * right < 0
-    return np.where(crossing, (left**2 + right**2) / np.where(crossing, size, 1.0), size) / 2
+    return np.asarray(np.where(crossing, (left**2 + right**2) / np.where(crossing, size, 1.0), size) / 2)

@@ -219,7 +219,7 @@ class Cells:
             x = np.vstack([x, powers[1] @ x[-1] + inputs[-1]])
         if self.start == "periodic":
             x[-1] = x[0]
-        return x
+        return np.asarray(x)
 
     def _returning(self, lacking: np.ndarray, end: np.ndarray, adjoint: bool) -> np.ndarray:
         """x with lacking x = end. Of integrators one component is free, taken as 0, and one equation follows."""

@@ -17,7 +17,6 @@ from experiments.runs.guarantee import guarantee
 from experiments.runs.metrics import last_saturation, over_last, settling_time
 from experiments.runs.references import Reference
 from experiments.runs.sector_promise import Verdict, judge_run
-from identification.model.model_file import number
 
 SETTLED = 0.01  # band of the settling time, as a share of the reference's amplitude
 
@@ -36,7 +35,7 @@ def span(design: Design, reference: Reference) -> float:
     """The period of the reference's slowest sinusoid in seconds; of a constant, twice the corrected one's recovery."""
     if np.isfinite(reference.period_s):
         return reference.period_s
-    return 2 * number(design.anti_windup["corrected"], "recovery_s")
+    return 2 * design.corrected.judgement.recovery_s
 
 
 def run_all(loops: Mapping[str, SaturatedLoop], limit: float, time_s: np.ndarray) -> dict[str, Run]:

@@ -153,7 +153,7 @@ class SampledReference:
 
     def __call__(self, time_s: np.ndarray) -> np.ndarray:
         """r at times of any shape."""
-        return np.interp(time_s, self.time_s, self.values)
+        return np.asarray(np.interp(time_s, self.time_s, self.values))
 
     @property
     def amplitude(self) -> float:

@@ -112,7 +112,8 @@ def _largest(group: Sequence[tuple[int, Wave]], sign: int) -> tuple[float, float
         return total, doubt
 
     def values(x: np.ndarray) -> np.ndarray:
-        return sign * np.sum([a * np.sin(n * x + p) for a, n, p in zip(amplitude, k, phase, strict=True)], axis=0)
+        waves = [a * np.sin(n * x + p) for a, n, p in zip(amplitude, k, phase, strict=True)]
+        return np.asarray(sign * np.sum(waves, axis=0))
 
     step = 2 * math.pi / (POINTS * int(k.max()))
     starts, best, bend = np.arange(POINTS * int(k.max())) * step, -math.inf, float(amplitude @ k**2)

@@ -22,7 +22,8 @@ def chapter_2(set_name: str = "implied") -> Design:
         "implied" or "table".
     """
     chosen = printed()["delay_free"]
-    return design_delay_free(model_named(set_name), chosen["reference"]["period_s"], chosen["epsilon"])
+    model = model_named(set_name)
+    return design_delay_free(model.plant, model.additive_bound, chosen["reference"]["period_s"], chosen["epsilon"])
 
 
 @cache
@@ -36,7 +37,8 @@ def chapter_4(set_name: str = "implied") -> Design:
     """
     chosen = printed()["extended"]
     omega, pairs = chosen["reference"]["omega"], [(chosen["e"], chosen["f"])]
-    return design_extended(model_named(set_name), [omega], chosen["a"], pairs)
+    model = model_named(set_name)
+    return design_extended(model.plant, model.additive_bound, [omega], chosen["a"], pairs)
 
 
 def thesis_reference(kind: str, omegas: Sequence[float]) -> Reference:

@@ -1,15 +1,17 @@
-"""How every command line answers bad input: one sentence, exit status 2, no traceback."""
+"""How every command line answers bad input: one sentence, exit status 2, no traceback; or the sentence in a file."""
 
 from __future__ import annotations
 
 import atexit
 import gc
+from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
 
-from identification.base.errors import InputError
+from identification.base.errors import InputError, MissingFile
+from identification.base.files import write_whole
 
 EXTRAS = {"dask": "campaign", "distributed": "campaign", "pyarrow": "campaign"}  # of pyproject.toml, by their modules
 
@@ -25,19 +27,52 @@ class CommandGroup(click.Group):
 
     So they do when finite numbers lead out of what floating point can hold: an overflow, a singular matrix, an
     array larger than the memory; and where a module of an extra is not installed.
+
+    With ``--refusal FILE``, for a chain of commands that goes on without the one that refuses, the exit status is 0
+    and the sentence stands in FILE too. A command that lacks an input, which one before it refused to write, then does
+    nothing, and writes nothing.
     """
+
+    def __init__(self, *arguments: Any, **attributes: Any) -> None:
+        super().__init__(*arguments, **attributes)
+        said = "Where a refusal is kept, a sentence; the exit status is 0 then, and when an input is missing."
+        self.params.append(
+            click.Option(["--refusal"], type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help=said)
+        )
 
     def invoke(self, ctx: click.Context) -> Any:
         atexit.register(gc.freeze)  # without it the interpreter sweeps all modules as it ends: a third of a second
+        refusal: Path | None = ctx.params.pop("refusal")
+        if refusal is not None:
+            _keep(refusal, None)
         try:
             with np.errstate(over="raise"):
                 return super().invoke(ctx)
         except InputError as error:
-            raise Refusal(str(error)) from None
+            sentence, is_missing = str(error), isinstance(error, MissingFile)
         except (ArithmeticError, np.linalg.LinAlgError, MemoryError) as error:
-            raise Refusal(f"the numbers given are too extreme to compute with ({error})") from None
+            sentence, is_missing = f"the numbers given are too extreme to compute with ({error})", False
         except ModuleNotFoundError as error:
             if error.name not in EXTRAS:
                 raise
             extra = f'pip install "antiwindup-thesis[{EXTRAS[error.name]}]"'
             raise Refusal(f"{error.name} is not installed, which this command needs; give {extra}") from None
+        if refusal is None:
+            raise Refusal(sentence)
+        if is_missing:
+            return click.echo(f"{sentence}; nothing is done", err=True)
+        Refusal(sentence).show()
+        return _keep(refusal, sentence)
+
+
+def _keep(refusal: Path, sentence: str | None) -> None:
+    """Write the sentence of a refusal, or remove that of an earlier one."""
+    try:
+        if sentence is None:
+            refusal.unlink(missing_ok=True)
+        else:
+            write_whole({refusal: lambda path: path.write_text(f"{sentence}\n", encoding="utf-8")})
+    except InputError as error:
+        raise Refusal(str(error)) from None
+    except OSError as error:
+        raise Refusal(f"{refusal}: cannot be written ({error.strerror})") from None

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from identification.base.errors import InputError
+from identification.base.errors import InputError, MissingFile
 
 
 def _umask() -> int:
@@ -21,13 +21,15 @@ def read_text(path: Path) -> str:
 
     Raises
     ------
+    MissingFile
+        There is no such file.
     InputError
-        The file is missing, is a folder, may not be read, or is not UTF-8 text.
+        The file is a folder, may not be read, or is not UTF-8 text.
     """
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
+        raise MissingFile(f"{path}: no such file") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: byte {error.start} is not UTF-8; expected a text file") from None
     except OSError as error:
@@ -39,13 +41,15 @@ def read_bytes(path: Path) -> bytes:
 
     Raises
     ------
+    MissingFile
+        There is no such file.
     InputError
-        The file is missing, is a folder, or may not be read.
+        The file is a folder or may not be read.
     """
     try:
         return path.read_bytes()
     except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
+        raise MissingFile(f"{path}: no such file") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
 

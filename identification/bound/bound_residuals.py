@@ -13,6 +13,7 @@ from identification.base.errors import InputError
 from identification.bound.envelope import WIDTH, envelope_of
 from identification.bound.tightest_bound import Points, resonances, shares, tightest
 from identification.model.plant import HIGHEST_ORDER, AdditiveBound, PlantModel
+from identification.model.reports import BoundReport, Excess, Touch
 from identification.sweeps.response import FrequencyResponse
 
 GRID = 1000  # frequencies, equal in logarithm, that are looked at besides the lines
@@ -22,77 +23,6 @@ NEAR = 0.01  # share of a residual within which W_a touches it
 ZOOMS = 3  # into what is between the grid's frequencies where W_a is within PEAK of a fit's distance
 ZOOM = 33  # frequencies
 PEAK = 1e-3
-
-
-@dataclass(frozen=True)
-class Touch:
-    """Where W_a is nearly as small as a residual.
-
-    Parameters
-    ----------
-    omega
-        In rad/s.
-    test
-        The name of the test whose residual it is.
-    between_lines
-        The residual is that of the test's own fit.
-    ratio
-        Of |W_a| over the residual, 1 or little more.
-    """
-
-    omega: float
-    test: str
-    between_lines: bool
-    ratio: float
-
-
-@dataclass(frozen=True)
-class Excess:
-    """|W_a| over an envelope, as ratios.
-
-    Parameters
-    ----------
-    largest, largest_omega
-        The largest, and where it is in rad/s.
-    mean
-        Geometric, with equal weight for equal log frequency.
-    """
-
-    largest: float
-    largest_omega: float
-    mean: float
-
-
-@dataclass(frozen=True)
-class BoundReport:
-    """W_a and how tight it is.
-
-    Parameters
-    ----------
-    bound
-        At least |P - test| at every line of every test, and at least the distance between P and the test's own fit
-        on a grid between the lines.
-    largest_excess, mean_excess
-        Of |W_a| over the envelope of all residuals, at the lines, at the frequencies between them where W_a is fitted,
-        and around its own modes.
-    least_excess
-        No W_a of this order that covers the residuals has a smaller largest excess, as multipliers prove in ball
-        arithmetic for the residuals and envelope as computed; 1 says nothing.
-    at_lines, between_lines
-        Over the envelope of the tests' residuals at their lines, and over that of their fits' distances between the
-        lines; the latter is None without fits, or when none differs from P.
-    touches
-        Where W_a is within NEAR of a residual, the closest first; of those within WIDTH in log frequency only the
-        closest.
-    """
-
-    bound: AdditiveBound
-    largest_excess: float
-    mean_excess: float
-    least_excess: float
-    at_lines: Excess
-    between_lines: Excess | None
-    touches: tuple[Touch, ...]
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ class Shape:
 
     def log(self, theta: Real, omega: Real) -> Real:
         """log |W_a| (M,) at omega (M,) in rad/s."""
-        return theta[0] + sum(sign * np.log(square) / 2 for sign, square, _ in self._factors(theta, omega))
+        return np.asarray(theta[0] + sum(sign * np.log(square) / 2 for sign, square, _ in self._factors(theta, omega)))
 
     def slope(self, theta: Real, omega: Real) -> Real:
         """(M, 2n) derivatives of :meth:`log`."""

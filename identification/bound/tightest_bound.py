@@ -172,7 +172,7 @@ def fit_bound(points: Points, order: int) -> AdditiveBound:
 def shares(x: Real) -> Real:
     """(K,) weights of the mean over increasing ``x`` (K,) of what is linear between its values."""
     half = np.diff(x) / 2 / (x[-1] - x[0])
-    return np.append(half, 0.0) + np.append(0.0, half)
+    return np.asarray(np.append(half, 0.0) + np.append(0.0, half))
 
 
 def resonances(*models: PlantModel | AdditiveBound) -> Real:
@@ -189,7 +189,7 @@ def _largest(omega: Real, values: Real, edges: Real) -> Whole:
     bins = np.linspace(edges[0], edges[1], BINS + 1)[1:-1]
     where = np.searchsorted(bins, np.log(omega), side="right")
     order = np.lexsort((values, where))
-    return order[np.append(np.diff(where[order]) > 0, True)]
+    return np.asarray(order[np.append(np.diff(where[order]) > 0, True)])
 
 
 def _search(

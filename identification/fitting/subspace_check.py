@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import warnings
-from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
@@ -17,6 +16,7 @@ from scipy.signal import resample_poly
 from identification.base.arrays import Complex, Real
 from identification.model.plant import Mode, PlantModel
 from identification.model.pulse_response import pulse_zeros
+from identification.model.reports import ModeCheck, SubspaceCheck
 
 if TYPE_CHECKING:
     from identification.sweeps.response import Record
@@ -29,61 +29,6 @@ LARGEST_ORDER = 40
 HORIZON = 3  # of past and future rows, in orders
 LONGEST = 65536  # samples; the method's time and memory grow with them
 NEAR = 0.1  # of omega, within which a mode of one model is taken for that of the other
-
-
-@dataclass(frozen=True)
-class ModeCheck:
-    """One mode of the plant and the nearest one of the subspace model.
-
-    Parameters
-    ----------
-    kind
-        ``zero`` or ``pole``.
-    omega, zeta
-        The plant's; rad/s.
-    found_omega, found_zeta
-        The subspace model's nearest, None where none is within NEAR omega in the s plane.
-    """
-
-    kind: str
-    omega: float
-    zeta: float
-    found_omega: float | None
-    found_zeta: float | None
-
-
-@dataclass(frozen=True)
-class SubspaceCheck:
-    """What a subspace model of the raw record says of the plant's modes.
-
-    Parameters
-    ----------
-    order
-        Number of states.
-    sampling_s
-        Sampling interval in seconds of the record as it was used.
-    modes
-        Zero modes, then pole modes, of those that oscillate within the band; none when there is no answer.
-    reason
-        Why there is no answer, or None.
-    """
-
-    order: int
-    sampling_s: float
-    modes: tuple[ModeCheck, ...]
-    reason: str | None = None
-
-    def __str__(self) -> str:
-        if self.reason is not None:
-            return f"N4SID of order {self.order}: no answer ({self.reason})"
-        words = []
-        for mode in self.modes:
-            if mode.found_omega is None or mode.found_zeta is None:
-                words.append(f"no {mode.kind} near {mode.omega:.5g} rad/s")
-            else:
-                change = f"{100 * (mode.found_omega / mode.omega - 1):+.2g} %"
-                words.append(f"{mode.kind} {mode.found_omega:.5g} rad/s ({change}), zeta {mode.found_zeta:.3g}")
-        return f"N4SID of order {self.order}: " + ("; ".join(words) or "the plant has no mode in the band to check")
 
 
 def check_modes(plant: PlantModel, record: Record, band_omega: tuple[float, float]) -> SubspaceCheck:

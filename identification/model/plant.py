@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from identification.base.arrays import Complex
 from identification.base.errors import InputError
+from identification.model.parameter import Parameter
 from identification.model.python_control import from_control, to_control
 
 if TYPE_CHECKING:
@@ -125,6 +126,17 @@ class PlantModel:
         s = np.asarray(s, dtype=np.complex128)
         lead = self.gain / s**self.integrators * np.exp(-self.delay_s * s)
         return np.asarray(lead * _quotient(self.zero_modes, self.real_zeros, self.pole_modes, self.real_poles, s))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Gain; omega and zeta of each zero mode, of each pole mode; real zeros, real poles; dead time."""
+        found = [Parameter("gain", 1, "", self.gain)]
+        for kind, modes in (("zero", self.zero_modes), ("pole", self.pole_modes)):
+            for index, mode in enumerate(modes, 1):
+                found += [Parameter(kind, index, what, getattr(mode, what)) for what in ("omega", "zeta")]
+        for kind, rates in (("real_zero", self.real_zeros), ("real_pole", self.real_poles)):
+            found += [Parameter(kind, index, "", rate) for index, rate in enumerate(rates, 1)]
+        return (*found, Parameter("delay_s", 1, "", self.delay_s))
 
     def without_delay(self) -> PlantModel:
         """The delay-free factor G(s) of chapter 2."""

@@ -96,7 +96,7 @@ def pulse_response(plant: PlantModel, sampling_s: float, omega: ArrayLike) -> Co
     states = np.ones((len(generator), theta.size), dtype=complex)
     for i, pole in enumerate(np.diag(generator)[1:], 1):
         states[i] = np.einsum("j,jm->m", transition[i, :i], states[:i]) / (shift - np.expm1(pole))
-    return np.einsum("j,jm->m", sampled, states) * np.exp(-1j * theta * whole)
+    return np.asarray(np.einsum("j,jm->m", sampled, states) * np.exp(-1j * theta * whole))
 
 
 def aliases(plant: PlantModel, sampling_s: float, omega: ArrayLike) -> Complex:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,30 +91,6 @@ class Structure:
             real_zeros=tuple(float(rate) for rate in np.exp(real_zeros)),
             real_poles=tuple(float(rate) for rate in np.exp(real_poles)),
         )
-
-    def parameters(self, plant: PlantModel) -> Iterator[tuple[str, float]]:
-        """Label and value of each parameter of a plant of this structure, in theta's order and physical units."""
-        yield "gain", plant.gain
-        for kind, modes in (("zero", plant.zero_modes), ("pole", plant.pole_modes)):
-            for i, mode in enumerate(modes, 1):
-                yield f"{kind} mode {i}, omega [rad/s]", mode.omega
-                yield f"{kind} mode {i}, zeta", mode.zeta
-        for kind, rates in (("zero", plant.real_zeros), ("pole", plant.real_poles)):
-            for rate in rates:
-                yield f"real {kind} [rad/s]", rate
-        yield "delay [s]", plant.delay_s
-
-    def to_dict(self, numbers: Real) -> dict[str, Any]:
-        """One number for each parameter (zeros + poles + 2,) in the shape of the ``plant`` object of model.json."""
-        zero_modes, pole_modes, real_zeros, real_poles = self.split(numbers)
-        return {
-            "gain": float(numbers[0]),
-            "zero_modes": [{"omega": float(a), "zeta": float(b)} for a, b in zero_modes],
-            "pole_modes": [{"omega": float(a), "zeta": float(b)} for a, b in pole_modes],
-            "delay_s": float(numbers[-1]),
-            "real_zeros": [float(a) for a in real_zeros],
-            "real_poles": [float(a) for a in real_poles],
-        }
 
 
 def in_physical_units(theta: Real, errors: Real) -> Real:

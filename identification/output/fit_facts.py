@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from math import floor, log10
-from typing import Any
 
+from identification.base.arrays import Real
 from identification.base.digits import lower_end
-from identification.bound.bound_residuals import BoundReport
 from identification.fitting.first_guess import BOUNDS
 from identification.fitting.fit_plant import FitResult
 from identification.fitting.single_test_fit import OneFit
-from identification.fitting.subspace_check import SubspaceCheck
-from identification.model.model_file import plant_to_dict
+from identification.model.fit_record import Criterion, FitRecord, FittedTest, Noise, Numbers
 from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.reports import BoundReport, SubspaceCheck
 from identification.model.structure import in_physical_units
 from identification.sweeps.response import FrequencyResponse
 
@@ -23,76 +21,58 @@ WIDTHS = (28, 12, 26, 11, 11)  # of the columns, at least
 POOR = 0.15  # median distance of a test from its own fit
 
 
-def standard_errors(result: FitResult) -> dict[str, Any]:
-    """The standard errors of the nominal plant in the shape and units of model.json's ``plant``."""
-    return result.structure.to_dict(in_physical_units(result.nominal.theta, result.nominal.errors))
+def standard_errors(result: FitResult) -> Numbers:
+    """The standard errors of the nominal plant's parameters, in their units."""
+    return _numbers(in_physical_units(result.nominal.theta, result.nominal.errors))
 
 
-def fit_to_dict(result: FitResult) -> dict[str, Any]:
-    """The facts of a fit that model.json records."""
-    lower, upper = result.nominal.intervals
-    shaped = result.structure.to_dict
-    how = (
-        "each test on its own; mean of the logarithms, mean delay" if result.nominal.scattered else "one plant for all"
+def fit_record(
+    tests: Sequence[FrequencyResponse], result: FitResult, report: BoundReport, checks: Mapping[str, SubspaceCheck]
+) -> FitRecord:
+    """What model.json records of a fit: its tests' files, and how W_a lies over the residuals."""
+    nominal = result.nominal
+    how = "each test on its own; mean of the logarithms, mean delay" if nominal.scattered else "one plant for all"
+    lower, upper = nominal.intervals
+    return FitRecord(
+        source="identification fit",
+        synthetic=any(test.synthetic for test in tests),
+        structure=str(result.structure),
+        method=f"maximum likelihood, {how}",
+        loss="soft-L1" if result.soft else "least squares",
+        criterion=Criterion(
+            name="BIC",
+            overdispersion=result.overdispersion,
+            by_structure={str(structure): value for structure, value in result.criterion.items()},
+        ),
+        lower=_numbers(lower),
+        upper=_numbers(upper),
+        noise=_numbers(in_physical_units(nominal.theta, nominal.noise)),
+        misfit=_numbers(in_physical_units(nominal.theta, nominal.misfit)),
+        scatter=None if nominal.scatter is None else _numbers(in_physical_units(nominal.theta, nominal.scatter)),
+        agreement_of_tests=nominal.agreement,
+        tests=tuple(_test_record(test, fit) for test, fit in zip(tests, result.tests, strict=True)),
+        bound=report,
+        checks=checks,
     )
 
-    def errors(theta: Any) -> dict[str, Any] | None:
-        return None if theta is None else shaped(in_physical_units(result.nominal.theta, theta))
 
-    return {
-        "structure": str(result.structure),
-        "method": f"maximum likelihood, {how}",
-        "loss": "soft-L1" if result.soft else "least squares",
-        "criterion": {
-            "name": "BIC",
-            "overdispersion": result.overdispersion,
-            "by_structure": {str(structure): value for structure, value in result.criterion.items()},
-        },
-        "intervals_95": {"lower": shaped(lower), "upper": shaped(upper)},
-        "noise_standard_errors": errors(result.nominal.noise),
-        "misfit_standard_errors": errors(result.nominal.misfit),
-        "scatter_standard_errors": errors(result.nominal.scatter),
-        "agreement_of_tests": result.nominal.agreement,
-        "tests": [_test_to_dict(test) for test in result.tests],
-    }
+def _test_record(test: FrequencyResponse, fit: OneFit) -> FittedTest:
+    return FittedTest(
+        name=fit.name,
+        lines=fit.lines,
+        plant=fit.plant,
+        standard_errors=_numbers(in_physical_units(fit.theta, fit.errors)),
+        noise=Noise(fit.floor, fit.relative),
+        chi_square=fit.chi_square,
+        residual_correlation=fit.correlation,
+        median_distance=fit.distance,
+        sha256=None if test.path is None else hashlib.sha256(test.path.read_bytes()).hexdigest(),
+        synthetic=test.synthetic,
+    )
 
 
-def _test_to_dict(test: OneFit) -> dict[str, Any]:
-    return {
-        "name": test.name,
-        "lines": test.lines,
-        "plant": plant_to_dict(test.plant),
-        "standard_errors": test.structure.to_dict(in_physical_units(test.theta, test.errors)),
-        "noise": {"floor": test.floor, "relative": test.relative},
-        "chi_square": test.chi_square,
-        "residual_correlation": test.correlation,
-        "median_distance": test.distance,
-    }
-
-
-def facts(
-    tests: Sequence[FrequencyResponse], result: FitResult, report: BoundReport, checks: Mapping[str, SubspaceCheck]
-) -> dict[str, Any]:
-    """The ``fit`` object of model.json: the fit, its tests' files, and how W_a lies over the residuals."""
-    content = fit_to_dict(result)
-    for entry, test in zip(content["tests"], tests, strict=True):
-        entry["sha256"] = None if test.path is None else hashlib.sha256(test.path.read_bytes()).hexdigest()
-        entry["synthetic"] = test.synthetic
-    return {
-        "source": "identification fit",
-        "synthetic": any(test.synthetic for test in tests),
-        **content,
-        "bound": {
-            "order": report.bound.order,
-            "largest_excess": report.largest_excess,
-            "mean_excess": report.mean_excess,
-            "least_excess": report.least_excess,
-            "at_lines": asdict(report.at_lines),
-            "between_lines": None if report.between_lines is None else asdict(report.between_lines),
-            "touches": [asdict(touch) for touch in report.touches],
-        },
-        "subspace_check": [{"test": name, **asdict(check), "said": str(check)} for name, check in checks.items()],
-    }
+def _numbers(values: Real) -> Numbers:
+    return tuple(float(value) for value in values)
 
 
 def check_lines(checks: Mapping[str, SubspaceCheck]) -> list[str]:
@@ -137,14 +117,14 @@ def parameter_rows(result: FitResult) -> list[tuple[str, float, float, float, fl
     )
     return [
         (
-            label,
-            value,
+            parameter.label,
+            parameter.value,
             float(lower[k]),
             float(upper[k]),
             float(noise[k]),
             None if scatter is None else float(scatter[k]),
         )
-        for k, (label, value) in enumerate(result.structure.parameters(result.plant))
+        for k, parameter in enumerate(result.plant.parameters)
     ]
 
 

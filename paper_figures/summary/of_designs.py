@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import isnan
-from typing import Any
 
 import pandas as pd
 
+from design.anti_windup.judge import Compensator
 from design.design_file import Design
 from identification.base.digits import lower_end, upper_end
 from paper_figures.look.captions import apart, number, of_run, only, promises, required_input, time_unit
@@ -83,11 +83,11 @@ def sentences(design: Design, name: str, tables: Mapping[str, pd.DataFrame]) -> 
     """What a design is and gives; its limits and the parameter study of f if there are tables of them."""
     if name == "robust":
         return _redesign(design, tables.get("robustness"))
-    if design.hinf:
+    if design.hinf is not None:
         said = [
             "For the plant without its dead time",
-            f"||[W1 S; W2 T]|| = {upper_end(design.hinf['gamma'], 4)}, no stabilising controller below "
-            f"{lower_end(design.hinf['gamma_lower'], 4)}",
+            f"||[W1 S; W2 T]|| = {upper_end(design.hinf.gamma, 4)}, no stabilising controller below "
+            f"{lower_end(design.hinf.gamma_lower, 4)}",
         ]
         if not design.blocks["K"].is_stable:
             said.append("K itself is UNSTABLE and diverges when the actuator saturates")
@@ -96,11 +96,11 @@ def sentences(design: Design, name: str, tables: Mapping[str, pd.DataFrame]) -> 
         said = [f"With the exact dead time; poles of T_so {poles}"]
     if name in tables:
         said.insert(0, promises(tables[name]).removesuffix("."))
-    thesis, corrected = (design.anti_windup[kind] for kind in ("thesis", "corrected"))
+    thesis, corrected = design.thesis, design.corrected
     said.append(
-        f"theta1~: alpha = {number(thesis['alpha'])} s, beta = {number(thesis['beta'])} s, gamma = "
-        f"{number(thesis['gamma'])} by (2.23); corrected for the sector {number(corrected['sector'])}, recovery in "
-        f"{number(corrected['recovery_s'])} s"
+        f"theta1~: alpha = {number(thesis.alpha)} s, beta = {number(thesis.beta)} s, gamma = "
+        f"{number(thesis.gamma)} by (2.23); corrected for the sector {number(corrected.sector)}, recovery in "
+        f"{number(corrected.judgement.recovery_s)} s"
     )
     if name == "extended" and "f_gamma" in tables:
         said.append(f"The least f of (2.23) found over beta is {number(only(tables['f_gamma'], 'f_best'))}")
@@ -111,10 +111,9 @@ def sentences(design: Design, name: str, tables: Mapping[str, pd.DataFrame]) -> 
 
 
 def _redesign(design: Design, robustness: pd.DataFrame | None) -> str:
-    order = int(design.parameters["roll_off_order"])
-    said = "As the design of chapters 3, 4"
-    if order:
-        said += f", with {order} more poles of T_so at {number(design.parameters['roll_off'])} rad/s"
+    said, roll_off = "As the design of chapters 3, 4", design.free.roll_off
+    if roll_off is not None and roll_off.order:
+        said += f", with {roll_off.order} more poles of T_so at {number(roll_off.rate)} rad/s"
     if robustness is None:
         return f"{said}."
     before, after = (number(of_run(robustness, f"design_{name}", "peak")) for name in ("extended", "robust"))
@@ -132,11 +131,12 @@ def _redesign(design: Design, robustness: pd.DataFrame | None) -> str:
     )
 
 
-def _judgement(facts: Mapping[str, Any] | None) -> tuple[str, str, str]:
-    if facts is None:
+def _judgement(compensator: Compensator | None) -> tuple[str, str, str]:
+    if compensator is None:
         return "", "", ""
-    sector = "any" if facts["popov_sector"] is None else number(facts["popov_sector"])
-    return number(facts["f"]), sector, "stable" if facts["theta2_stable"] else "NOT stable"
+    judged = compensator.judgement
+    sector = "any" if judged.popov_sector is None else number(judged.popov_sector)
+    return number(judged.f), sector, "stable" if judged.theta2_stable else "NOT stable"
 
 
 def _guarantee(table: pd.DataFrame, run: str) -> str:

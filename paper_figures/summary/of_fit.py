@@ -6,12 +6,14 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot
-from typing import Any
 
 from identification.base.digits import lower_end
 from identification.base.errors import InputError
 from identification.fitting.nominal_plant import ONE_PLANT
-from identification.model.model_file import IdentifiedModel, plant_to_dict
+from identification.model.fit_record import FitRecord
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.reports import BoundReport, SubspaceCheck
 from identification.output.fit_facts import bound_text, cautions, digits_of
 from identification.sweeps.response import FrequencyResponse
 from paper_figures.look.captions import number
@@ -19,6 +21,7 @@ from paper_figures.look.captions import number
 Paragraph = tuple[str, str]
 """A head and sentences."""
 
+SYMBOLS = {"gain": "gain K", "delay [s]": "delay h [s]"}
 MOST_NAMES = 6  # of files, one by one
 MOST_TOUCHES = 3  # that are named
 CERTAIN = 1e-6  # a probability below this is as good as 0
@@ -43,30 +46,43 @@ def parameter_table(model: IdentifiedModel) -> Table:
     InputError
         The model does not say how it was fitted.
     """
-    plant = plant_to_dict(model.plant)
-    scattered = fact(model.fit, "scatter_standard_errors") is not None
+    fit = fitted(model)
+    ends, errors = zip(fit.lower, fit.upper, strict=True), zip(fit.noise, fit.misfit, strict=True)
+    columns = [[hypot(*both) for both in errors], *([fit.scatter] if fit.scatter is not None else [])]
 
-    def cells(*path: str | int) -> tuple[str, ...]:
-        value = fact(plant, *path)
-        low, high = (fact(model.fit, "intervals_95", end, *path) for end in ("lower", "upper"))
-        errors = [hypot(*(fact(model.fit, f"{kind}_standard_errors", *path) for kind in ("noise", "misfit")))]
-        errors += [fact(model.fit, "scatter_standard_errors", *path)] if scattered else []
+    def cells(value: float, low: float, high: float, *errors: float) -> tuple[str, ...]:
         digits = digits_of(max(abs(value), abs(low), abs(high)), high - low)
         estimate, lower, upper = (_rounded(value, digits) for value in (value, low, high))
         return estimate, f"{lower} to {upper}", *(f"{error:.2g}" for error in errors)
 
-    rows: list[tuple[str, ...]] = [("gain K", *cells("gain"))]
-    for kind in ("zero", "pole"):
-        for i in range(len(plant[f"{kind}_modes"])):
-            pair = cells(f"{kind}_modes", i, "omega") + cells(f"{kind}_modes", i, "zeta")
-            rows.append((f"{kind} mode {i + 1}, omega [rad/s]", *pair))
-    for kind in ("zero", "pole"):
-        rows += [(f"real {kind} [rad/s]", *cells(f"real_{kind}s", i)) for i in range(len(plant[f"real_{kind}s"]))]
-    rows.append(("delay h [s]", *cells("delay_s")))
+    values = [parameter.value for parameter in model.plant.parameters]
+    said = [cells(value, *both, *beside) for value, both, *beside in zip(values, ends, *columns, strict=True)]
+    sureness = ("95 % interval", "noise", *(["scatter"] if fit.scatter is not None else []))
+    return plant_table(model.plant, said, ("estimate", *sureness))
+
+
+def plant_table(plant: PlantModel, cells: Sequence[tuple[str, ...]], head: tuple[str, ...]) -> Table:
+    """A row for each parameter of a plant, for a mode omega at the left and zeta at the right.
+
+    Parameters
+    ----------
+    plant
+        Whose parameters are named.
+    cells
+        What is said of each of ``plant.parameters``.
+    head
+        Of these cells; that of zeta begins with its name.
+    """
+    rows: list[tuple[str, ...]] = []
+    for parameter, said in zip(plant.parameters, cells, strict=True):
+        if parameter.quantity == "zeta":
+            rows[-1] += said
+        else:
+            rows.append((SYMBOLS.get(parameter.label, parameter.label), *said))
     width = max(map(len, rows))
-    sureness = ("95 % interval", "noise", *(["scatter"] if scattered else []))
-    head = ("parameter", "estimate", *sureness, "zeta", *sureness)[:width]
-    return Table(head, tuple(row + ("",) * (width - len(row)) for row in rows))
+    return Table(
+        ("parameter", *head, "zeta", *head[1:])[:width], tuple(row + ("",) * (width - len(row)) for row in rows)
+    )
 
 
 def paragraphs(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> tuple[Paragraph, ...]:
@@ -77,27 +93,23 @@ def paragraphs(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> tu
     InputError
         The model does not say how it was fitted.
     """
+    fit = fitted(model)
     return (
         ("Tests", _tests(tests)),
-        ("Structure", _structure(model.fit)),
-        ("Intervals", _intervals(model.fit)),
-        ("Residuals", _residuals(model.fit)),
-        *(("Caution", said) for said in _cautions(model)),
-        *(("Subspace", said) for said in _checks(model.fit.get("subspace_check") or ())),
-        ("Bound", _bound(model)),
+        ("Structure", _structure(fit)),
+        ("Intervals", _intervals(fit)),
+        ("Residuals", _residuals(fit)),
+        *(("Caution", said) for said in _cautions(model.plant, fit)),
+        *(("Subspace", said) for said in _checks(fit.checks)),
+        ("Bound", _bound(model.additive_bound, fit.bound)),
     )
 
 
-def fact(facts: Mapping[str, Any], *path: str | int) -> Any:
-    """Return what stands in nested facts at a path; raises InputError if nothing does."""
-    found: Any = facts
-    for key in path:
-        try:
-            found = found[key]
-        except (KeyError, IndexError, TypeError):
-            where = ".".join(map(str, path))
-            raise InputError(f"the fit says nothing of {where}; expected a model that was fitted to sweeps") from None
-    return found
+def fitted(model: IdentifiedModel) -> FitRecord:
+    """How a model was fitted; raises InputError if it does not say."""
+    if model.fit is None:
+        raise InputError("the fit says nothing of tests; expected a model that was fitted to sweeps")
+    return model.fit
 
 
 def _rounded(value: float, digits: int) -> str:
@@ -123,11 +135,11 @@ def _tests(tests: Sequence[FrequencyResponse]) -> str:
     )
 
 
-def _structure(fit: Mapping[str, Any]) -> str:
+def _structure(fit: FitRecord) -> str:
     form = "A mode is the factor 1 + 2 zeta s/omega + (s/omega)^2, a real root 1 + s/omega, all 1 at s = 0."
-    others = dict(fact(fit, "criterion", "by_structure"))
-    own = others.pop(fact(fit, "structure"), None)
-    divisor = fact(fit, "criterion", "overdispersion")
+    others = dict(fit.criterion.by_structure)
+    own = others.pop(fit.structure, None)
+    divisor = fit.criterion.overdispersion
     grown = f" The deviance is divided by {number(divisor)}, since no structure leaves noise." if divisor > 1 else ""
     if own is None or not others:
         return f"{form} No other structure was tried.{grown}"
@@ -139,8 +151,8 @@ def _structure(fit: Mapping[str, Any]) -> str:
     return f"{form} Its BIC is {number(gain)} better than that of the next best, {best}.{grown}"
 
 
-def _intervals(fit: Mapping[str, Any]) -> str:
-    agreement, count = fact(fit, "agreement_of_tests"), len(fact(fit, "tests"))
+def _intervals(fit: FitRecord) -> str:
+    agreement, count = fit.agreement_of_tests, len(fit.tests)
     if agreement is None:
         return "By the noise of the one test; how tests would differ is not known. The noise's column: standard errors."
     chance = f"below {CERTAIN:g}" if agreement < CERTAIN else f"of {number(agreement, 1)}"
@@ -153,71 +165,58 @@ def _intervals(fit: Mapping[str, Any]) -> str:
     return f"By the noise, since the {count} tests differ by no more: {chance}. {errors}."
 
 
-def _residuals(fit: Mapping[str, Any]) -> str:
-    tests = fact(fit, "tests")
-    of_each = {
-        key: [fact(test, key) for test in tests] for key in ("median_distance", "chi_square", "residual_correlation")
-    }
-    floors, shares = ([fact(test, "noise", key) for test in tests] for key in ("floor", "relative"))
-    misfit = any(_numbers(fact(fit, "misfit_standard_errors")))
+def _residuals(fit: FitRecord) -> str:
     return (
-        f"From each test's own fit: median distance {_range([100 * d for d in of_each['median_distance']])} % of the "
-        f"response; noise of {_range([100 * share for share in shares])} % of the response and a floor of "
-        f"{_range(floors)}; chi-square per degree of freedom {_range(of_each['chi_square'])}; correlation of "
-        f"neighbours {_range(of_each['residual_correlation'])}"
-        + (": that is no noise but what the structure leaves, and the intervals are widened for it." if misfit else ".")
+        f"From each test's own fit: median distance {_range([100 * test.median_distance for test in fit.tests])} % of "
+        f"the response; noise of {_range([100 * test.noise.relative for test in fit.tests])} % of the response and a "
+        f"floor of {_range([test.noise.floor for test in fit.tests])}; chi-square per degree of freedom "
+        f"{_range([test.chi_square for test in fit.tests])}; correlation of neighbours "
+        f"{_range([test.residual_correlation for test in fit.tests])}"
+        + (
+            ": that is no noise but what the structure leaves, and the intervals are widened for it."
+            if any(fit.misfit)
+            else "."
+        )
     )
 
 
-def _checks(checks: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def _checks(checks: Mapping[str, SubspaceCheck]) -> Iterator[str]:
     """How far the modes that N4SID finds in the raw records are from the fitted ones, and where it gives no answer."""
-    modes = [(mode, fact(check, "test")) for check in checks for mode in fact(check, "modes")]
-    found = [mode for mode, _ in modes if fact(mode, "found_omega") is not None]
-    if found:
-        omega, zeta = (
-            number(100 * max(abs(fact(mode, f"found_{key}") / fact(mode, key) - 1) for mode in found), 2)
-            for key in ("omega", "zeta")
-        )
+    modes = [(mode, test) for test, check in checks.items() for mode in check.modes]
+    changes = [
+        (abs(mode.found_omega / mode.omega - 1), abs(mode.found_zeta / mode.zeta - 1))
+        for mode, _ in modes
+        if mode.found_omega is not None and mode.found_zeta is not None
+    ]
+    if changes:
+        omega, zeta = (number(100 * max(of), 2) for of in zip(*changes, strict=True))
         yield (
-            f"N4SID, from nothing but the raw records, finds {len(found)} of their {len(modes)} modes, omega within "
+            f"N4SID, from nothing but the raw records, finds {len(changes)} of their {len(modes)} modes, omega within "
             f"{omega} % and zeta within {zeta} % of the fit."
         )
-    missed = [
-        f"{mode['kind']} of {number(mode['omega'])} rad/s ({test})"
-        for mode, test in modes
-        if mode["found_omega"] is None
-    ]
+    missed = [f"{mode.kind} of {number(mode.omega)} rad/s ({test})" for mode, test in modes if mode.found_omega is None]
     if missed:
         yield f"N4SID finds no {_few(missed)}."
-    for reason in dict.fromkeys(fact(check, "reason") for check in checks):
+    for reason in dict.fromkeys(check.reason for check in checks.values()):
         if reason is not None:
-            names = [fact(check, "test") for check in checks if check["reason"] == reason]
+            names = [test for test, check in checks.items() if check.reason == reason]
             yield f"No answer by N4SID from {_few(names)}: {reason}."
 
 
-def _cautions(model: IdentifiedModel) -> list[str]:
-    distance = max(fact(test, "median_distance") for test in fact(model.fit, "tests"))
-    return [f"{said[0].upper()}{said[1:]}." for said in cautions(model.plant, distance)]
+def _cautions(plant: PlantModel, fit: FitRecord) -> list[str]:
+    distance = max(test.median_distance for test in fit.tests)
+    return [f"{said[0].upper()}{said[1:]}." for said in cautions(plant, distance)]
 
 
-def _bound(model: IdentifiedModel) -> str:
-    facts = fact(model.fit, "bound")
+def _bound(bound: AdditiveBound, report: BoundReport) -> str:
     touches = [
-        f"{fact(touch, 'test')} at {number(fact(touch, 'omega'), 4)} rad/s"
-        + (" between the lines" if fact(touch, "between_lines") else "")
-        for touch in fact(facts, "touches")[:MOST_TOUCHES]
+        f"{touch.test} at {number(touch.omega, 4)} rad/s" + (" between the lines" if touch.between_lines else "")
+        for touch in report.touches[:MOST_TOUCHES]
     ]
     return (
-        f"{bound_text(model.additive_bound)}: at no line below the distance of a test from the model, nor between the "
+        f"{bound_text(bound)}: at no line below the distance of a test from the model, nor between the "
         "lines, as far as was looked, below that of its own fit, "
-        f"{number(fact(facts, 'mean_excess'))} times their envelope on average and "
-        f"{number(fact(facts, 'largest_excess'))} times at most (no bound of this order gets below "
-        f"{lower_end(fact(facts, 'least_excess'), 3)}). It touches {', '.join(touches)}."
+        f"{number(report.mean_excess)} times their envelope on average and "
+        f"{number(report.largest_excess)} times at most (no bound of this order gets below "
+        f"{lower_end(report.least_excess, 3)}). It touches {', '.join(touches)}."
     )
-
-
-def _numbers(facts: Any) -> list[float]:
-    """Every number in nested facts."""
-    if isinstance(facts, Mapping):
-        facts = list(facts.values())
-    return [value for entry in facts for value in _numbers(entry)] if isinstance(facts, list) else [float(facts)]

@@ -16,7 +16,7 @@ from identification.model.model_file import IdentifiedModel
 from identification.sweeps.response import FrequencyResponse
 from paper_figures.look import panels, style
 from paper_figures.look.bode import draw_distance, draw_magnitude, draw_phase, draw_relative_distance
-from paper_figures.summary.of_fit import Paragraph, Table, fact
+from paper_figures.summary.of_fit import Paragraph, Table, fitted
 from paper_figures.summary.words import Summary
 
 WIDTH, HEIGHT = 8.27, 11.69  # A4 [in]
@@ -117,7 +117,7 @@ def _panels(
     magnitude, distance, phase, relative = map(figure.add_subplot, places)
     draw_magnitude(magnitude, tests, model.plant)
     draw_phase(phase, tests, model.plant)
-    touches_omega = [fact(touch, "omega") for touch in fact(model.fit, "bound", "touches")]
+    touches_omega = [touch.omega for touch in fitted(model).bound.touches]
     draw_distance(distance, tests, model.plant, model.additive_bound, touches_omega)
     draw_relative_distance(relative, tests, model.plant, model.additive_bound)
     for panel in (magnitude, distance):

@@ -14,7 +14,7 @@ from identification.model.model_file import IdentifiedModel
 from identification.sweeps.response import FrequencyResponse
 from paper_figures.summary import of_designs, of_fit
 from paper_figures.summary.of_designs import DESIGNS, FIGURES, FOLLOWING
-from paper_figures.summary.of_fit import Paragraph, Table, fact
+from paper_figures.summary.of_fit import Paragraph, Table, fitted
 
 WIDTH = 112  # of the text, in characters
 
@@ -80,16 +80,17 @@ def summarise(
     InputError
         The model does not say how it was fitted, or was fitted to other tests.
     """
-    fitted = [fact(test, "name") for test in fact(model.fit, "tests")]
-    if fitted != [test.name for test in tests]:
-        raise InputError(f"the model was fitted to {', '.join(fitted)}; expected these sweeps")
+    fit = fitted(model)
+    names = [test.name for test in fit.tests]
+    if names != [test.name for test in tests]:
+        raise InputError(f"the model was fitted to {', '.join(names)}; expected these sweeps")
     synthetic = sum(test.synthetic for test in tests)
     made = {name: design for name, design in designs.items() if isinstance(design, Design)}
     tables = {name: table for name, table in outcomes.items() if isinstance(table, pd.DataFrame)}
     given = [(DESIGNS[name], of_designs.sentences(made[name], name, tables)) for name in made]
     refused = tuple(_refused(designs, outcomes))
     return Summary(
-        title=f"Plant with {fact(model.fit, 'structure')}",
+        title=f"Plant with {fit.structure}",
         synthetic=f"SYNTHETIC DATA: {synthetic} of {len(tests)} tests were never measured" if synthetic else "",
         parameters=of_fit.parameter_table(model),
         basis=of_fit.paragraphs(model, tests),

@@ -31,7 +31,7 @@ from identification.model.model_file import IdentifiedModel
 @pytest.fixture(scope="module")
 def delay_free_design(implied: IdentifiedModel) -> Design:
     chosen = printed()["delay_free"]
-    return design_delay_free(implied, chosen["reference"]["period_s"], chosen["epsilon"])
+    return design_delay_free(implied.plant, implied.additive_bound, chosen["reference"]["period_s"], chosen["epsilon"])
 
 
 @pytest.fixture(scope="module")
@@ -113,11 +113,11 @@ def test_printed_form_is_too_large_at_low_frequencies(name: str, ratio: float, r
 def test_gamma_opt_scales_with_the_weights(factor: float, delay_free_design: Design):
     hinf = delay_free_design.hinf
     assert hinf is not None
-    synthesis = mixed_sensitivity(
-        delay_free_design.blocks["G_A"], hinf["W1"].scaled(factor), hinf["W2"].scaled(factor), hinf["decay_rate"]
+    _, synthesis = mixed_sensitivity(
+        delay_free_design.blocks["G_A"], hinf.W1.scaled(factor), hinf.W2.scaled(factor), hinf.decay_rate
     )
-    assert synthesis.gamma == pytest.approx(factor * hinf["gamma"], rel=1e-3)
-    assert synthesis.gamma_lower == pytest.approx(factor * hinf["gamma_lower"], rel=1e-3)
+    assert synthesis.gamma == pytest.approx(factor * hinf.gamma, rel=1e-3)
+    assert synthesis.gamma_lower == pytest.approx(factor * hinf.gamma_lower, rel=1e-3)
 
 
 # f(gamma)

@@ -183,7 +183,7 @@ def test_both_choices_of_weights_are_what_remark_1_asks_for(weights: str):
     design = DESIGNS[weights]()
     assert design.hinf is not None
     plant, W_a = design.loop_plant, design.additive_bound
-    assert design.hinf["W2"](S) * plant(S) == pytest.approx(W_a(S), rel=1e-9)
+    assert design.hinf.W2(S) * plant(S) == pytest.approx(W_a(S), rel=1e-9)
     assert margins_of(delay_loop(design, plant), W_a).W_a_C_S.value < 0.1
 
 
@@ -201,7 +201,7 @@ def test_the_controller_output_exceeds_the_limits_by_little(weights: str):
 def test_the_printed_bound_guarantees_nothing(name: str, peak: float, at: float | None):
     """For the set behind the printed transfer functions; for Table 2.1 as printed it does, with zeta_n1 = 0.08."""
     model = model_named(name)
-    design = design_extended(model, [1.5], 4.0, [(2.0, 1.0)])
+    design = design_extended(model.plant, model.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
     found = margins_of(delay_loop(design, design.loop_plant), model.additive_bound).W_a_C_S
     assert found.value == pytest.approx(peak, abs=0.005)
     assert at is None or found.omega == pytest.approx(at, rel=1e-3)
@@ -225,7 +225,7 @@ def test_a_constant_is_followed_without_a_controller_pole_at_zero(extended_desig
 
 def test_N_p_at_zero_is_one_over_a(extended_design: Design):
     """N_p = 1/(s + a), and X = a = 1/N_p(0), with which N_p X + D_p Y = 1 for Y = 1."""
-    a = extended_design.parameters["a"]
+    a = extended_design.free.a
     assert 1 / (0 + a) == 1 / a
     assert 1 / (S + a) * a + S / (S + a) * 1 == pytest.approx(np.ones(len(S)), rel=1e-14)
 
@@ -360,7 +360,7 @@ def test_other_printed_numbers_turn_their_statements(inputs: Inputs, monkeypatch
 
 def test_another_design_turns_its_statements(inputs: Inputs, implied: IdentifiedModel, monkeypatch: pytest.MonkeyPatch):
     """A robust redesign keeps what is stable and equal, and is robust."""
-    redesigned = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9)
+    redesigned = design_extended(implied.plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9)
     before = smith_predictor(inputs)
     monkeypatch.setattr("experiments.thesis.claims.checks.statements.chapter_4", lambda: redesigned)
     after = smith_predictor(inputs)
@@ -390,9 +390,7 @@ def test_the_corrected_anti_windup_turns_the_statements_of_the_runs(
     inputs: Inputs, extended_design: Design, monkeypatch: pytest.MonkeyPatch
 ):
     """With the corrected compensator in the thesis's place the error converges, and faster than without."""
-    renamed = replace(
-        extended_design, anti_windup=extended_design.anti_windup | {"thesis": extended_design.anti_windup["corrected"]}
-    )
+    renamed = replace(extended_design, thesis=replace(extended_design.thesis, kind=extended_design.corrected.kind))
     monkeypatch.setattr(saturated_runs, "chapter_4", lambda: renamed)
     found = saturated_runs.extended(inputs)
     assert found["statement.error_converges"] == found["statement.minimises_error"] == 1

@@ -14,6 +14,7 @@ from design.__main__ import main as design
 from experiments.__main__ import main as experiments
 from identification.__main__ import main as identification
 from paper_figures import __main__ as command_line
+from paper_figures.thesis import figure_registry
 
 ROOT = Path(__file__).resolve().parents[2]
 SWEEPS = [ROOT / "data" / "elevation" / "synthetic_test_1_frf.csv"]
@@ -70,7 +71,7 @@ def made_up_ledger() -> pd.DataFrame:
 def report(build: Path, *sweeps: Path, model: str = "") -> Result:
     """What the command answers, asked for the few figures alone."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(command_line, "figure_names", lambda: FIGURES)
+        patch.setattr(figure_registry, "figure_names", lambda: FIGURES)
         return invoke(command_line.main, "report", model or build / "model.json", *sweeps, "--build", build)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import combinations, pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,11 +14,16 @@ from matplotlib.figure import Figure
 
 from data.thesis import model_named
 from design.anti_windup.compensator import second_order
+from design.anti_windup.judge import CorrectedCompensator, Judgement, PrintedCompensator
 from design.blocks.block import Block
 from design.design_file import Design
+from design.hinf.mixed_sensitivity import Synthesis
+from design.parameters import DelayFreeParameters, ExtendedParameters, RollOff
 from identification.base.errors import InputError
+from identification.model.fit_record import Criterion, FitRecord, FittedTest, Noise
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.reports import BoundReport, Excess, ModeCheck, SubspaceCheck, Touch
 from identification.model.structure import Structure
 from identification.sweeps.response import FrequencyResponse
 from paper_figures.__main__ import main
@@ -56,71 +60,74 @@ def sweeps_of(plant: PlantModel, count: int, synthetic: bool = False) -> list[Fr
     ]
 
 
-def facts_of(plant: PlantModel, tests: list[FrequencyResponse]) -> dict[str, Any]:
+def record_of(plant: PlantModel, tests: list[FrequencyResponse], bound: AdditiveBound) -> FitRecord:
     zeros, poles = (
         2 * len(modes) + len(rates)
         for modes, rates in ((plant.zero_modes, plant.real_zeros), (plant.pole_modes, plant.real_poles))
     )
     structure = Structure(plant.integrators, zeros, poles)
-    values = np.array([value for _, value in structure.parameters(plant)])
 
-    def share(part: float) -> dict[str, Any]:
-        return structure.to_dict(part * values)
+    def share(part: float) -> tuple[float, ...]:
+        return tuple(part * parameter.value for parameter in plant.parameters)
 
-    each = {"noise": {"floor": 2e-4, "relative": 0.0125}, "chi_square": 1.02, "residual_correlation": 0.03}
-    return {
-        "structure": str(structure),
-        "synthetic": any(test.synthetic for test in tests),
-        "criterion": {
-            "name": "BIC",
-            "overdispersion": 1.0,
-            "by_structure": {str(structure): 5.0, "1 integrator": 99.0},
-        },
-        "intervals_95": {"lower": share(0.98), "upper": share(1.02)},
-        "noise_standard_errors": share(0.003),
-        "misfit_standard_errors": share(0.0),
-        "scatter_standard_errors": share(0.01) if len(tests) > 1 else None,
-        "agreement_of_tests": 1e-9 if len(tests) > 1 else None,
-        "tests": [{"name": test.name, "median_distance": 0.012, **each} for test in tests],
-        "bound": {
-            **{"order": 2, "mean_excess": 3.25, "largest_excess": 12.5, "least_excess": 11.75},
-            "touches": [{"omega": 55.5, "test": tests[0].name, "between_lines": False, "ratio": 1.0}],
-        },
-    }
+    return FitRecord(
+        source="identification fit",
+        synthetic=any(test.synthetic for test in tests),
+        structure=str(structure),
+        method="maximum likelihood",
+        loss="least squares",
+        criterion=Criterion("BIC", 1.0, {str(structure): 5.0, "1 integrator": 99.0}),
+        lower=share(0.98),
+        upper=share(1.02),
+        noise=share(0.003),
+        misfit=share(0.0),
+        scatter=share(0.01) if len(tests) > 1 else None,
+        agreement_of_tests=1e-9 if len(tests) > 1 else None,
+        tests=tuple(
+            FittedTest(
+                name=test.name,
+                lines=test.omega.size,
+                plant=plant,
+                standard_errors=share(0.003),
+                noise=Noise(2e-4, 0.0125),
+                chi_square=1.02,
+                residual_correlation=0.03,
+                median_distance=0.012,
+                sha256=None,
+                synthetic=test.synthetic,
+            )
+            for test in tests
+        ),
+        bound=BoundReport(
+            bound, 12.5, 3.25, 11.75, Excess(1.0, 1.0, 1.0), None, (Touch(55.5, tests[0].name, False, 1.0),)
+        ),
+        checks={},
+    )
 
 
 def model_of(plant: PlantModel, tests: list[FrequencyResponse], bound: AdditiveBound = SIMPLE) -> IdentifiedModel:
-    return IdentifiedModel(plant, bound, None, facts_of(plant, tests))
+    return IdentifiedModel(plant, bound, None, record_of(plant, tests, bound))
 
 
 def design_of(kind: str) -> Design:
-    judged = {"f": 0.0625, "popov_sector": None, "theta2_stable": False}
+    judged = Judgement(0.0625, 50.0, None, 0.0, 48.5, False, None, 0.125)
+    delay_free = kind == "delay-free"
     return Design(
         kind=kind,
         plant=plant_of(1),
         additive_bound=SIMPLE,
         reference_omegas=(1.5,),
         blocks={"K": Block(1.0, (), (1 + 0j,)), "C0": Block(1.0), "T_so": Block(1.0, (), (-4 + 0j, -1 + 2j, -1 - 2j))},
-        hinf={"gamma": 0.375, "gamma_lower": 0.3125} if kind == "delay-free" else None,
-        anti_windup={
-            "thesis": {
-                "alpha": 0.03,
-                "beta": 0.02,
-                "gamma": 48.5,
-                **judged,
-                **second_order(0.03, 0.02, 48.5).to_dict(),
-            },
-            "corrected": {
-                "sector": 0.75,
-                "recovery_s": 1.75,
-                "bandwidth": 275.0,
-                **judged,
-                "popov_sector": 1.0,
-                "theta2_stable": True,
-                **second_order(0.5, 0.5, -1.0).to_dict(),
-            },
-        },
-        parameters={},
+        hinf=Synthesis(0.3125, "", 0.375, 0.5, 0.3125, "", 0.375, Block(1.0), Block(1.0)) if delay_free else None,
+        parameters=DelayFreeParameters(4.0, 1e-4) if delay_free else ExtendedParameters(4.0, (), "zeros", 0.0, {}),
+        thesis=PrintedCompensator(second_order(0.03, 0.02, 48.5), judged, 0.03, 0.02, 48.5),
+        corrected=CorrectedCompensator(
+            second_order(0.5, 0.5, -1.0),
+            replace(judged, popov_sector=1.0, theta2_stable=True, recovery_s=1.75),
+            0.75,
+            275.0,
+            0.03125,
+        ),
     )
 
 
@@ -266,19 +273,21 @@ def test_what_the_fit_leaves_is_said():
     plant = PlantModel(2.0, (), (Mode(20.0, 1.5e-5),), 0.0)
     tests = sweeps_of(plant, 2)
     model = model_of(plant, tests)
-    facts = dict(model.fit)
-    facts["tests"] = [entry | {"median_distance": 0.25} for entry in facts["tests"]]
-    facts["misfit_standard_errors"] = facts["noise_standard_errors"]
-    facts["agreement_of_tests"] = 0.5
-    facts["criterion"] = {"overdispersion": 19.5, "by_structure": {facts["structure"]: 5.0}}
-    mode = {"kind": "pole", "omega": 20.0, "zeta": 0.25}
-    found, missed = {"found_omega": 20.125, "found_zeta": 0.375}, {"found_omega": None, "found_zeta": None}
-    facts["subspace_check"] = [
-        {"test": "day_0.csv", "reason": None, "modes": [mode | found, mode | missed]},
-        {"test": "day_1.csv", "reason": None, "modes": [mode | found | {"found_omega": 20.5}, mode | missed]},
-        {"test": "day_2.csv", "reason": "too short", "modes": []},
-    ]
-    text = " ".join(summarise(IdentifiedModel(plant, SIMPLE, None, facts), tests, {}, {}).text().split())
+    fit = model.fit
+    found, missed = ModeCheck("pole", 20.0, 0.25, 20.125, 0.375), ModeCheck("pole", 20.0, 0.25, None, None)
+    fit = replace(
+        fit,
+        tests=tuple(replace(test, median_distance=0.25) for test in fit.tests),
+        misfit=fit.noise,
+        agreement_of_tests=0.5,
+        criterion=Criterion("BIC", 19.5, {fit.structure: 5.0}),
+        checks={
+            "day_0.csv": SubspaceCheck(4, 0.01, (found, missed)),
+            "day_1.csv": SubspaceCheck(4, 0.01, (replace(found, found_omega=20.5), missed)),
+            "day_2.csv": SubspaceCheck(4, 0.01, (), "too short"),
+        },
+    )
+    text = " ".join(summarise(replace(model, fit=fit), tests, {}, {}).text().split())
     for part in (
         "differ by no more: tests of one plant would differ as much with a probability of 0.5",
         "No other structure was tried. The deviance is divided by 19.5",
@@ -308,8 +317,8 @@ def test_an_interval_shows_two_digits_of_its_half_width(half, shown):
     plant = PlantModel(174.5, (), (), 0.0, 0)
     tests = sweeps_of(plant, 1)
     model = model_of(plant, tests)
-    ends = {"lower": {"gain": 174.5 - half, "delay_s": 0.0}, "upper": {"gain": 174.5 + half, "delay_s": 0.0}}
-    row = parameter_table(IdentifiedModel(plant, SIMPLE, None, dict(model.fit) | {"intervals_95": ends})).rows[0]
+    fit = replace(model.fit, lower=(174.5 - half, 0.0), upper=(174.5 + half, 0.0))
+    row = parameter_table(replace(model, fit=fit)).rows[0]
     assert row[2] == shown
 
 
@@ -392,7 +401,8 @@ def test_panels_show_tests_model_and_bound():
 
 
 def test_the_robust_redesign_in_words() -> None:
-    design = replace(design_of("extended"), parameters={"roll_off": 45.5, "roll_off_order": 2})
+    plain = design_of("extended")
+    design = replace(plain, parameters=replace(plain.free, roll_off=RollOff(0.9, 2, 45.5)))
     table = pd.DataFrame(
         {
             "run": ["design_extended", "design_robust"],
@@ -405,5 +415,5 @@ def test_the_robust_redesign_in_words() -> None:
     for part in ("2 more poles of T_so at 45.5 rad/s", "= 0.875, where that design has 7.25", "1.5 ms to 144 ms"):
         assert part in said
     assert sentences(design, "robust", {}).endswith("45.5 rad/s.")
-    as_it_is = replace(design, parameters={"roll_off_order": 0})
+    as_it_is = replace(plain, parameters=replace(plain.free, roll_off=RollOff(0.9, 0, 45.5)))
     assert sentences(as_it_is, "robust", {}) == "As the design of chapters 3, 4."

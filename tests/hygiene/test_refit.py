@@ -14,20 +14,35 @@ Make = Callable[..., subprocess.CompletedProcess[str]]
 
 # Writes what the command of the same words would; refuses, or crashes, if a file of that name lies beside it.
 STAND_IN = r"""#!/bin/bash
-here=$(dirname "$0")
-room=$2 command=$3 design=$4 output=${!#}
-[ "$command" != thesis ] || { command=$4 design=$5; }
-[ "$room" != paper_figures ] || [ "$command" != draw ] || command=$4
-if [ -e "$here/$command.refuses" ]; then echo "Error: $command will not" >&2; exit 2; fi
+here=$(dirname "$0") said="$*" room=$2
+shift 2
+[ "$1" != --refusal ] || { refusal=$2; rm -f "$refusal"; shift 2; }
+[ "$1" != thesis ] || shift
+command=$1 output=${!#}
+[ "$command" != draw ] || {
+    command=$2
+    for table in $(sed -n "s/^TABLES-$2 := //p" build/prerequisites.mk); do
+        [ -e "$4/$table.csv" ] || exit 0
+    done
+}
+for input; do
+    case $input in "$output") ;; *.json | *.parquet) [ -z "$refusal" ] || [ -e "$input" ] || exit 0 ;; esac
+done
+if [ -e "$here/$command.refuses" ]; then
+    echo "Error: $command will not" >&2
+    [ -n "$refusal" ] || exit 2
+    echo "$command will not" > "$refusal"
+    exit
+fi
 if [ -e "$here/$command.crashes" ]; then echo "Traceback of $command" >&2; exit 1; fi
-echo "$*" >> "$here/log"
+echo "$said" >> "$here/log"
 case $room in
 identification | design) touch "$output" ;;
 experiments)
     [ $command != campaign ] || { touch "$output"; exit; }
     name=${command//-/_}
     [ $command != campaign-tables ] || { name=campaign; touch "$output/campaign_distance.csv"; }
-    [ $command != limits ] || name=limits_$(basename "$design" .json | sed s/design_//)
+    [ $command != limits ] || name=limits_$(basename "$2" .json | sed s/design_//)
     [ $command != sampled-rates ] || name=sampled
     [ $command != interpolation ] || touch "$output/interpolation_map.csv"
     touch "$output/$name.csv" "$output/${name}_summary.csv" ;;
@@ -44,8 +59,15 @@ def make(tmp_path: Path) -> Make:
     python.write_text(STAND_IN, encoding="utf-8")
     python.chmod(0o755)
     own = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
-    (tmp_path / "a.csv").touch()
-    common = ["make", f"PY={python}", "READY=Makefile", f"OUT={tmp_path / 'mine'}", f"SWEEPS={tmp_path / 'a.csv'}"]
+    for name in ("a.csv", "ready"):
+        (tmp_path / name).touch()
+    common = [
+        "make",
+        f"PY={python}",
+        f"READY={tmp_path / 'ready'}",
+        f"OUT={tmp_path / 'mine'}",
+        f"SWEEPS={tmp_path / 'a.csv'}",
+    ]
 
     def run(*arguments: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run([*common, *arguments], cwd=ROOT, env=own, capture_output=True, text=True, check=False)
@@ -113,7 +135,7 @@ def test_a_refused_design_takes_only_what_hangs_on_it(make: Make, tmp_path: Path
         ),
     }
     sentence = tmp_path / "mine" / "design_extended.refused.txt"
-    assert sentence.read_text(encoding="utf-8") == "Error: extended will not\n"
+    assert sentence.read_text(encoding="utf-8") == "extended will not\n"
     (tmp_path / "extended.refuses").unlink()
     assert make("refit", f"SWEEPS={tmp_path / 'b.csv'}").returncode == 0
     assert built(tmp_path) == everything

@@ -49,25 +49,6 @@ def test_no_number_of_the_plant_in_the_code(path: Path) -> None:
             assert node.value not in PLANT, f"{name_of(path)}, line {node.lineno}: {node.value}"
 
 
-def test_makefile_knows_every_figures_tables() -> None:
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    feeds: dict[str, set[str]] = {}
-    for table, names in re.findall(r"\$\(call feeds,(\w+),([\w ]+)\)", makefile):
-        for name in names.split():
-            feeds.setdefault(name, set()).update((table, f"{table}_summary"))
-    for name, table in re.findall(r"\$\(call drawing,(\w+)\): \$\(RESULTS\)/(\w+)\.csv", makefile):
-        feeds[name].add(table)
-    sys.path.insert(0, str(ROOT))
-    from paper_figures.thesis.figure_registry import figure_module, figure_names
-
-    diagrams = set(re.search(r"DIAGRAMS := (.*)", makefile)[1].split())  # type: ignore[index]
-    assert len(figure_names()) == 27
-    for name in figure_names():
-        tables = set(figure_module(name).TABLES)
-        assert tables <= feeds.get(name, set()), name
-        assert (name in diagrams) == (not tables)
-
-
 def locked(name: str) -> dict[str, str]:
     """Each pin of a lock file, its marker too, with the lines that belong to it."""
     text = (ROOT / name).read_text(encoding="utf-8")

@@ -14,7 +14,7 @@ from identification.model.plant import AdditiveBound, Mode, PlantModel
 def small_model() -> IdentifiedModel:
     """An integrator with one anti-resonance, one resonance and a dead time."""
     plant = PlantModel(2.0, (Mode(3.0, 0.05),), (Mode(4.0, 0.05),), 0.2)
-    return IdentifiedModel(plant, AdditiveBound.printed_form(0.1, 1.0, 3.5, 0.2), None, {})
+    return IdentifiedModel(plant, AdditiveBound.printed_form(0.1, 1.0, 3.5, 0.2))
 
 
 @pytest.fixture(scope="session")

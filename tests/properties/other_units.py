@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
+from design.anti_windup.compensator import AntiWindup
+from design.anti_windup.judge import Compensator
 from design.blocks.block import Block
 from design.chapter_2.design_delay_free import design_delay_free
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
+from design.parameters import DelayFreeParameters, ExtendedParameters
 from experiments.runs.references import Reference, SampledReference
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, Mode, PlantModel
@@ -70,7 +71,7 @@ class Units:
 
     def model(self, model: IdentifiedModel) -> IdentifiedModel:
         """Plant and bound; standard errors and what the fit says are left out."""
-        return IdentifiedModel(self.plant(model.plant), self.bound(model.additive_bound), None, {})
+        return IdentifiedModel(self.plant(model.plant), self.bound(model.additive_bound))
 
     def block(self, block: Block, factor: float = 1.0) -> Block:
         """``factor`` times the block at s times the unit of time."""
@@ -110,34 +111,43 @@ class Units:
             additive_bound=self.bound(design.additive_bound),
             reference_omegas=self.rates(design.reference_omegas),
             blocks=blocks,
-            anti_windup={name: self._anti_windup(facts) for name, facts in design.anti_windup.items()},
-            parameters={key: self._parameter(key, value) for key, value in design.parameters.items()},
+            parameters=self.parameters(design.parameters),
+            thesis=self.compensator(design.thesis),
+            corrected=self.compensator(design.corrected),
         )
 
-    def _anti_windup(self, facts: Mapping[str, Any]) -> dict[str, Any]:
-        found = dict(facts)
-        for name in ("theta1_tilde", "one_plus"):
-            found[name] = self.block(Block.from_dict(facts[name])).to_dict()
-        factors = {"alpha": self.time, "beta": self.time, "recovery_s": self.time, "bandwidth": 1 / self.time}
-        factors |= {"f": abs(self.gain), "f_lower": abs(self.gain), "f_omega": 1 / self.time}
-        return found | {name: facts[name] * factor for name, factor in factors.items() if name in facts}
+    def compensator(self, of: Compensator) -> Compensator:
+        """Times of the thesis's, bandwidth and f of the corrected one, and of each f, where and the recovery."""
+        factors = {"alpha": self.time, "beta": self.time, "bandwidth": 1 / self.time, "f_lower": abs(self.gain)}
+        judged = of.judgement
+        return replace(
+            of,
+            kind=AntiWindup(self.block(of.kind.theta1_tilde), self.block(of.kind.one_plus)),
+            judgement=replace(
+                judged,
+                f=judged.f * abs(self.gain),
+                f_omega=judged.f_omega / self.time,
+                recovery_s=judged.recovery_s * self.time,
+            ),
+            **{name: getattr(of, name) * factor for name, factor in factors.items() if hasattr(of, name)},
+        )
 
-    def _parameter(self, key: str, value: Any) -> Any:
-        if key in ("a", "roll_off"):
-            return value / self.time
-        if key == "pairs":
-            return [[e / self.time, f / self.time**2] for e, f in value]
-        return value
+    def parameters(self, of: DelayFreeParameters | ExtendedParameters) -> DelayFreeParameters | ExtendedParameters:
+        """a, e and f; nothing runs with chapter 2's."""
+        if isinstance(of, DelayFreeParameters):
+            return of
+        pairs = tuple((e / self.time, f / self.time**2) for e, f in of.pairs)
+        return replace(of, a=of.a / self.time, pairs=pairs)
 
 
 def small_extended(model: IdentifiedModel, time: float) -> Design:
     """Chapters 3 and 4 for the small plant, in a unit of time."""
-    return design_extended(model, [0.5 / time], 1.0 / time, [(1.0 / time, 0.3 / time**2)])
+    return design_extended(model.plant, model.additive_bound, [0.5 / time], 1.0 / time, [(1.0 / time, 0.3 / time**2)])
 
 
 def small_delay_free(model: IdentifiedModel, time: float) -> Design:
     """Chapter 2 for the small plant, in a unit of time."""
-    return design_delay_free(model, 12.0 * time, 1e-3 / time**2)
+    return design_delay_free(model.plant, model.additive_bound, 12.0 * time, 1e-3 / time**2)
 
 
 def same(found: np.ndarray, expected: np.ndarray, share: float) -> None:

@@ -211,9 +211,9 @@ def test_the_commands_say_the_same(small_designs: dict[str, Design], units: Unit
         added = ["anti-windup", str(own), "--name", "mine", f"--numerator={-2 / T!r}", f"--denominator=1 {2 / T!r}"]
         result = CliRunner().invoke(design_main, [*added, "--output", str(own.with_name("added.json"))])
         assert result.exit_code == 0, result.output
-        facts = read_design(own.with_name("added.json")).anti_windup["mine"]
-        numbers = [facts["f"] / abs(each.gain), facts["f_omega"] * T, facts["popov_sector"] or 0.0]
-        numbers += [facts["theta1_tilde_at_zero"], facts["recovery_s"] / T, facts["theta2_stable"]]
+        judged = read_design(own.with_name("added.json")).added["mine"].judgement
+        numbers = [judged.f / abs(each.gain), judged.f_omega * T, judged.popov_sector or 0.0]
+        numbers += [judged.theta1_tilde_at_zero, judged.recovery_s / T, judged.theta2_stable]
         options = ["--limit", repr(1.5 * abs(each.input)), "--until", repr(8 * T), "--amplitude", repr(5 * each.output)]
         options += ["--phase", repr(math.pi / 2)]
         for more in (

@@ -15,7 +15,6 @@ import pytest
 from other_units import Units, same, small_delay_free, small_extended
 from scipy.signal import chirp, cont2discrete, dlsim
 
-from design.anti_windup.compensator import AntiWindup
 from design.design_file import Design
 from experiments.campaign.draw_plants import PlantsWithin
 from experiments.campaign.run_plants import Campaign, code_sha256, run_chunk
@@ -152,9 +151,10 @@ def test_designs_of_the_scaled_model(
         for name in ("thesis", "corrected"):
             own, usual = found.anti_windup[name], expected.anti_windup[name]
             for number in ("f", "recovery_s"):
-                assert own[number] == pytest.approx(usual[number], rel=1e-2)
-            assert own["theta2_stable"] == usual["theta2_stable"]
-            assert AntiWindup.from_dict(own).one_plus.is_stable
+                here, there = (getattr(each.judgement, number) for each in (own, usual))
+                assert here == pytest.approx(there, rel=1e-2)
+            assert own.judgement.theta2_stable == usual.judgement.theta2_stable
+            assert own.kind.one_plus.is_stable
         tables = [robustness_tables({"one": each})["robustness_summary"] for each in (found, small_designs[kind])]
         same_tables({"": tables[0]}, {"": tables[1]}, units, 1e-6)
 
@@ -209,7 +209,7 @@ def test_the_fit_and_the_additive_error(units: Units, count: int) -> None:
         tests = measured(plant, each, count)
         fit = fit_plant(tests)
         report = bound_residuals(fit.plant, tests, [test.plant for test in fit.tests], 2)
-        model = IdentifiedModel(fit.plant, report.bound, None, {})
+        model = IdentifiedModel(fit.plant, report.bound)
         results.append((fit, report, additive_error_tables(model, tests)))
     (found, bound, errors), (expected, usual, usual_errors) = results
     assert found.structure == expected.structure

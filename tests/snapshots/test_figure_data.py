@@ -109,8 +109,15 @@ def stored_design(delay_free_design: Design, tmp_path_factory: pytest.TempPathFa
 @pytest.fixture(scope="module")
 def tables(extended_design: Design, stored_design: Design, campaign: Path) -> dict[str, pd.DataFrame]:
     implied = model_named("implied")
-    chosen = extended_design.parameters
-    robust = design_extended(implied, extended_design.reference_omegas, chosen["a"], chosen["pairs"], robust_level=0.9)
+    chosen = extended_design.free
+    robust = design_extended(
+        implied.plant,
+        implied.additive_bound,
+        extended_design.reference_omegas,
+        chosen.a,
+        chosen.pairs,
+        robust_level=0.9,
+    )
     return (
         pid_tables()
         | additive_error_tables(implied, sweeps())  # type: ignore[arg-type]

@@ -17,7 +17,7 @@ from identification.model.pulse_response import aliases
 from identification.sweeps.response import FrequencyResponse, Record
 
 PLANT = PlantModel(2.0, (Mode(60.0, 0.05),), (Mode(90.0, 0.04),), 0.004)
-MODEL = IdentifiedModel(PLANT, AdditiveBound.printed_form(0.3, 40.0, 60.0, 0.2), None, {})
+MODEL = IdentifiedModel(PLANT, AdditiveBound.printed_form(0.3, 40.0, 60.0, 0.2))
 
 
 @pytest.mark.parametrize(("held", "error"), [(True, 0.0), (False, 1.0)])

@@ -83,10 +83,10 @@ def test_the_printed_form_keeps_the_integrator_and_the_corrected_one_does_not(
     printed = second_order(0.05, 0.025, 97.0)
     assert 0j in printed.theta2(implied.plant).poles
     assert 0j not in best.anti_windup.theta2(implied.plant).poles
-    assert not judge(implied, printed).theta2_stable
-    assert judge(implied, best.anti_windup).theta2_stable
+    assert not judge(implied.plant, implied.additive_bound, printed).theta2_stable
+    assert judge(implied.plant, implied.additive_bound, best.anti_windup).theta2_stable
     # gamma = -1 is the printed form's only way out
-    assert judge(implied, second_order(0.2, 0.2, -1.0)).theta2_stable
+    assert judge(implied.plant, implied.additive_bound, second_order(0.2, 0.2, -1.0)).theta2_stable
 
 
 def test_the_lasting_offset_is_the_final_value(implied: IdentifiedModel, best: Corrected) -> None:
@@ -168,7 +168,7 @@ def test_the_corrected_one_keeps_what_it_states(implied: IdentifiedModel, best: 
     assert popov_sector(kind.theta1_tilde)[0] >= 0.95
     assert all(-960.0 * (1 + 1e-12) <= pole.real <= -np.log(100) * (1 - 1e-12) for pole in kind.one_plus.poles)
     assert all(zero.real < 0 for zero in kind.one_plus.zeros if zero != 0)
-    assert 0.9 < judge(implied, kind).recovery_s <= 1.0
+    assert 0.9 < judge(implied.plant, implied.additive_bound, kind).recovery_s <= 1.0
     assert best.f_lower <= best.f <= 1.001 * best.f_lower
 
 
@@ -284,11 +284,10 @@ def test_the_robust_sector_holds_for_drawn_uncertainties(best: Corrected) -> Non
 
 
 def test_compensators_of_a_design(implied: IdentifiedModel) -> None:
-    found = compensators(implied, 1.0)
-    assert set(found) == {"thesis", "corrected"}
-    assert found["corrected"]["bandwidth"] == pytest.approx(960.0)
-    assert found["corrected"]["lasting_offset"] == 0.0
-    assert found["thesis"]["lasting_offset"] == pytest.approx(7.105 * (1 + found["thesis"]["gamma"]), rel=1e-9)
+    thesis, own = compensators(implied.plant, implied.additive_bound, 1.0)
+    assert own.bandwidth == pytest.approx(960.0)
+    assert own.judgement.lasting_offset == 0.0
+    assert thesis.judgement.lasting_offset == pytest.approx(7.105 * (1 + thesis.gamma), rel=1e-9)
 
 
 @pytest.mark.parametrize("numbers", [(0.0, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, float("nan"))])

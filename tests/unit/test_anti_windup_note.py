@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -54,8 +52,7 @@ def test_fig_2_6_is_the_coprime_factor_scheme(extended_design: Design) -> None:
 def test_the_output_keeps_what_the_final_value_says(
     implied: IdentifiedModel, plant: PlantModel, limit: float, gamma: float
 ) -> None:
-    model = dataclasses.replace(implied, plant=plant)
-    design = design_extended(model, [1.5], 4.0, [(2.0, 1.0)])
+    design = design_extended(plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
     kind = second_order(0.05, 0.025, gamma)
     time_s = np.linspace(0.0, 40.0, 400001)
     run = simulate(design_loop(design, sinusoid(50.0, 1.5, 0.5, 0.0), kind), (-limit, limit), time_s)
@@ -94,7 +91,7 @@ def test_theta2_is_stable_if_and_only_if_M_takes_the_unstable_poles(
 
 
 def test_popov_does_not_see_the_offset(implied: IdentifiedModel) -> None:
-    judged = judge(implied, second_order(0.05, 0.025, 97.0))
+    judged = judge(implied.plant, implied.additive_bound, second_order(0.05, 0.025, 97.0))
     assert judged.popov_sector is None  # every sector
     assert not judged.theta2_stable
     assert judged.lasting_offset == pytest.approx(98 * implied.plant.gain, rel=1e-9)

@@ -55,7 +55,7 @@ def test_the_thesis_design(extended_design: Design) -> None:
 
 
 def test_the_redesign_is_guaranteed(implied: IdentifiedModel) -> None:
-    found = audit(design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9))
+    found = audit(design_extended(implied.plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9))
     assert not isinstance(found.margins, str)
     assert found.margins.is_guaranteed
     assert 0 < found.robust_sector["corrected"] < 0.95
@@ -71,16 +71,17 @@ def test_chapter_two_with_and_without_its_dead_time(delay_free_design: Design) -
     assert found.infimum is not None
     assert delay_free_design.hinf is not None
     assert found.infimum.lower < found.infimum.upper < 1.01 * found.infimum.lower
-    assert found.infimum.upper < delay_free_design.hinf["gamma"]
+    assert found.infimum.upper < delay_free_design.hinf.gamma
 
 
 def test_what_the_stabiliser_reaches_is_not_taken_from_the_file(delay_free_design: Design) -> None:
     hinf, K = delay_free_design.hinf, delay_free_design.blocks["K"]
     assert hinf is not None
-    found = audit(dataclasses.replace(delay_free_design, hinf={**hinf, "gamma": 1e-9, "gamma_line_lower": 1.0}))
+    claimed = dataclasses.replace(hinf, gamma=1e-9, gamma_line_lower=1.0)
+    found = audit(dataclasses.replace(delay_free_design, hinf=claimed))
     assert isinstance(found.stabiliser, Synthesis)
     for name in ("gamma_lower", "gamma", "gamma_line_lower", "gamma_line", "decay_rate", "reason", "line_reason"):
-        assert getattr(found.stabiliser, name) == hinf[name]
+        assert getattr(found.stabiliser, name) == getattr(hinf, name)
     slower = audit(dataclasses.replace(delay_free_design, blocks={**delay_free_design.blocks, "K": K.scaled(0.01)}))
     assert isinstance(slower.stabiliser, str)
     assert "with K a closed-loop pole lies at Re s = " in slower.stabiliser
@@ -88,7 +89,7 @@ def test_what_the_stabiliser_reaches_is_not_taken_from_the_file(delay_free_desig
 
 def test_a_dead_time_that_the_design_ignored_may_be_fatal(implied: IdentifiedModel) -> None:
     plant = dataclasses.replace(implied.plant, delay_s=0.2)
-    found = audit(design_delay_free(dataclasses.replace(implied, plant=plant), 4.0, 1e-4))
+    found = audit(design_delay_free(plant, implied.additive_bound, 4.0, 1e-4))
     assert isinstance(found.with_delay, str)
     assert "roots in the right half plane" in found.with_delay
 
@@ -104,8 +105,7 @@ def test_a_dead_time_that_the_design_ignored_may_be_fatal(implied: IdentifiedMod
 )
 def test_other_plants(implied: IdentifiedModel, plant: PlantModel, omegas: list[float]) -> None:
     bound = AdditiveBound.printed_form(0.0015 * abs(plant.gain), 20.0, 60.0, 0.05)
-    model = dataclasses.replace(implied, plant=plant, additive_bound=bound)
-    found = audit(design_extended(model, omegas, 4.0, [(2.0, 1.0)] * sum(omega > 0 for omega in omegas)))
+    found = audit(design_extended(plant, bound, omegas, 4.0, [(2.0, 1.0)] * sum(omega > 0 for omega in omegas)))
     assert not isinstance(found.margins, str)
     assert found.same_controller is not None
     assert found.same_controller < 1e-6
@@ -181,8 +181,7 @@ def test_the_robust_sector_sees_a_narrow_resonance_of_the_bound(implied: Identif
     zeta, plant = 1e-3, PlantModel(7.0, (), (), 0.01)
     for size, robust in ((0.8, False), (0.4, True)):
         bound = AdditiveBound(2.4 * zeta * size, (), (Mode(33.3, zeta), Mode(300.0, 0.5)), (200.0,), ())
-        model = dataclasses.replace(implied, plant=plant, additive_bound=bound)
-        found = audit(design_extended(model, [1.5], 4.0, [(2.0, 1.0)]))
+        found = audit(design_extended(plant, bound, [1.5], 4.0, [(2.0, 1.0)]))
         assert not isinstance(found.margins, str)
         assert found.margins.is_guaranteed == robust
         assert all((sector > 0) == robust for sector in found.robust_sector.values())
@@ -191,7 +190,9 @@ def test_the_robust_sector_sees_a_narrow_resonance_of_the_bound(implied: Identif
 
 
 def test_an_unstable_loop_has_no_robust_sector(implied: IdentifiedModel) -> None:
-    found = audit(design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=10.0))
+    found = audit(
+        design_extended(implied.plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=10.0)
+    )
     assert isinstance(found.margins, str)
     assert set(found.robust_sector.values()) == {0.0}
 
@@ -200,8 +201,7 @@ def test_an_unstable_loop_has_no_robust_sector(implied: IdentifiedModel) -> None
 def test_slow_and_fast_plants(implied: IdentifiedModel, scale: float) -> None:
     plant = PlantModel(7.0 * scale, (Mode(175 * scale, 0.01),), (Mode(282 * scale, 0.02),), 0.008 / scale)
     bound = AdditiveBound.printed_form(0.002, 20.0 * scale, 280.0 * scale, 0.02)
-    model = dataclasses.replace(implied, plant=plant, additive_bound=bound)
-    design = design_extended(model, [1.5 * scale, 10 * scale], 4.0 * scale, [(3 * scale, 2.25 * scale**2)] * 2)
+    design = design_extended(plant, bound, [1.5 * scale, 10 * scale], 4.0 * scale, [(3 * scale, 2.25 * scale**2)] * 2)
     found = audit(design)
     assert not isinstance(found.margins, str)
     assert not isinstance(found.roots, str)
@@ -219,6 +219,11 @@ def test_slow_and_fast_plants(implied: IdentifiedModel, scale: float) -> None:
         (lambda content: content["anti_windup"]["corrected"].update(bandwidth="x"), "expected a number"),
         (lambda content: content.update(hinf={"gamma": 1.0}), "gamma_lower"),
         (lambda content: content["anti_windup"]["thesis"]["one_plus"].update(gain=2.0), "is not 1 + theta1_tilde"),
+        (lambda content: content["anti_windup"]["thesis"].pop("f"), "'f' is None; expected a number"),
+        (lambda content: content["anti_windup"]["thesis"].update(theta2_stable=1), "expected true or false"),
+        (lambda content: content["anti_windup"].pop("corrected"), "there is no anti-windup 'corrected'"),
+        (lambda content: content["parameters"].update(pairs=[[1.0]]), "expected a list of pairs of numbers"),
+        (lambda content: content["parameters"].update(method=3), "expected a text"),
         (lambda content: content.update(reference_omegas=[-1.0]), "no negative number"),
         (lambda content: content.update(reference_omegas=1.5), "expected a list"),
     ],

@@ -14,6 +14,7 @@ from click.testing import CliRunner, Result
 from data.thesis import model_named
 from design.__main__ import main as design_main
 from design.anti_windup.compensator import from_one_plus
+from design.anti_windup.judge import Compensator, judge
 from design.blocks.block import Block
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
@@ -151,9 +152,11 @@ def test_simulate_writes_what_it_promises(runner: CliRunner, tmp_path: Path, ext
 def test_simulate_takes_a_theta1_of_the_design_and_several_amplitudes(
     runner: CliRunner, tmp_path: Path, implied: IdentifiedModel
 ) -> None:
-    design = design_extended(implied, [1.5, 3.0], 4.0, [(2.0, 1.0), (2.0, 4.0)])
+    design = design_extended(implied.plant, implied.additive_bound, [1.5, 3.0], 4.0, [(2.0, 1.0), (2.0, 4.0)])
     kind = from_one_plus(Block(1.0, (0j,), (-25.0 + 0j,)))
-    mine = dataclasses.replace(design, anti_windup={**design.anti_windup, "mine": kind.to_dict()})
+    mine = dataclasses.replace(
+        design, added={"mine": Compensator(kind, judge(implied.plant, implied.additive_bound, kind))}
+    )
     path, output = tmp_path / "mine.json", tmp_path / "run.csv"
     path.write_text(mine.to_json(), encoding="utf-8")
     arguments = ["simulate", str(path), *SIMULATE, "--anti-windup", "mine", "--output", str(output)]

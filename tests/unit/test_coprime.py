@@ -106,7 +106,7 @@ def test_integrator_of_chapter_3(a: float) -> None:
 def test_the_thesis_controller_is_one_of_them(extended_design: Design) -> None:
     """(4.2) is Theorem 2.1.1 for 1/s; and its Q comes back from C_0."""
     Q, C_0 = extended_design.blocks["Q"], extended_design.blocks["C0"]
-    factors = coprime_factors(Block(1.0, (), (0.0,)), (-float(extended_design.parameters["a"]),))
+    factors = coprime_factors(Block(1.0, (), (0.0,)), (-float(extended_design.free.a),))
     C = controller(factors, Q)
     np.testing.assert_allclose(C(S), C_0(S), rtol=1e-10)
     assert len(C.poles) == len(C_0.poles)

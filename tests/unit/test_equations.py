@@ -123,8 +123,7 @@ def designs(implied: IdentifiedModel, extended_design: Design) -> list[Design]:
     """Extended designs of the thesis's plant and of a random one with a longer dead time."""
     plant = dataclasses.replace(random_plant(np.random.default_rng(7)), delay_s=0.04)
     bound = AdditiveBound.printed_form(0.0015 * plant.gain, 20.0, 280.0, 0.01)
-    other = dataclasses.replace(implied, plant=plant, additive_bound=bound)
-    return [extended_design, design_extended(other, [2.5], 3.0, [(3.0, 2.0)])]
+    return [extended_design, design_extended(plant, bound, [2.5], 3.0, [(3.0, 2.0)])]
 
 
 # section 2.1
@@ -195,7 +194,7 @@ def test_lemma_1_the_error_of_the_linear_loop_dies_out(delay_free_design: Design
     plant = delay_free_design.plant.without_delay()
     s = points(np.random.default_rng(0))
     A, B, Lambda = plant_denominator(plant), plant_numerator(plant), blocks["Lambda"]
-    units = internal_model(plant, omega, delay_free_design.parameters["epsilon"])
+    units = internal_model(plant, omega, delay_free_design.parameters.epsilon)
     one_plus_F = 1 + units.F1(s) * units.F2(s)
     loop = design_loop(delay_free_design, sinusoid(50.0, omega, 0.7, 0.0), None)
     found = [signals(loop, complex(at), free=True) for at in s]
@@ -225,8 +224,8 @@ def test_remark_1_the_weights_hold_the_reference_and_the_uncertainty(delay_free_
     """W_1 has the roots of Lambda, moved left by twice the decay rate; |W_2| of stabiliser_problem is |W_a/G|."""
     design = delay_free_design
     assert design.hinf is not None
-    W_1, W_2, rate = (design.hinf[name] for name in ("W1", "W2", "decay_rate"))
-    Lambda = reference_polynomial(*design.reference_omegas, design.parameters["epsilon"])
+    W_1, W_2, rate = design.hinf.W1, design.hinf.W2, design.hinf.decay_rate
+    Lambda = reference_polynomial(*design.reference_omegas, design.parameters.epsilon)
     np.testing.assert_allclose(W_1.poles, np.array(Lambda.zeros) - 2 * rate, rtol=1e-12)
     s = 1j * np.geomspace(0.1, 1e3, 300)
     G = design.plant.without_delay()
@@ -397,8 +396,8 @@ def test_2_17_and_2_18_theta_1_and_theta_2(chapter: Design, seed: int) -> None:
     """Of design_delay_free and design_extended: theta_1 = theta1~ (1 + F), theta_2 = G (1 + theta1~)."""
     s = points(np.random.default_rng(seed))
     theta1_tilde, F = chapter.blocks["theta1_tilde"](s), chapter.blocks["F1"](s) * chapter.blocks["F2"](s)
-    chosen = chapter.anti_windup["thesis"]
-    formula = chosen["gamma"] / ((1 + chosen["alpha"] * s) * (1 + chosen["beta"] * s))
+    chosen = chapter.thesis
+    formula = chosen.gamma / ((1 + chosen.alpha * s) * (1 + chosen.beta * s))
     np.testing.assert_allclose(theta1_tilde, formula, rtol=1e-9)
     if "theta1" in chapter.blocks:
         theta1 = chapter.blocks["theta1"](s)

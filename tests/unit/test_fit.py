@@ -50,7 +50,7 @@ def _structure(plant: PlantModel) -> Structure:
 
 
 def _theta(plant: PlantModel) -> NDArray[np.float64]:
-    values = [value for _, value in _structure(plant).parameters(plant)]
+    values = [parameter.value for parameter in plant.parameters]
     return np.append(np.log(np.abs(values[:-1])), values[-1])
 
 

@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 from identification.__main__ import main
 from identification.model.model_file import read_model
 from identification.model.plant import Mode, PlantModel
+from identification.model.plant_json import shaped
 from paper_figures.__main__ import main as paper_figures_main
 
 PLANT = PlantModel(-2.0, (Mode(50.0, 0.03),), (Mode(80.0, 0.02),), 5e-3)
@@ -44,15 +45,17 @@ def test_writes_a_model_that_design_can_read(tmp_path: Path, sweeps: list[Path])
     assert model.plant.gain == pytest.approx(-2.0, rel=0.02)
     assert model.plant.pole_modes[0].omega == pytest.approx(80.0, rel=0.01)
     assert model.standard_errors is not None
-    assert model.standard_errors["pole_modes"][0].keys() == {"omega", "zeta"}
-    assert 0 < model.standard_errors["delay_s"] < 1e-4
-    assert model.fit["structure"] == "1 integrator, 1 zero mode, 1 pole mode"
-    lower, upper = (model.fit["intervals_95"][end]["pole_modes"][0]["omega"] for end in ("lower", "upper"))
+    errors = shaped(model.plant, model.standard_errors)
+    assert errors["pole_modes"][0].keys() == {"omega", "zeta"}
+    assert 0 < errors["delay_s"] < 1e-4
+    assert model.fit is not None
+    assert model.fit.structure == "1 integrator, 1 zero mode, 1 pole mode"
+    lower, upper = (shaped(model.plant, end)["pole_modes"][0]["omega"] for end in (model.fit.lower, model.fit.upper))
     assert lower < model.plant.pole_modes[0].omega < upper
-    assert model.fit["synthetic"] is False
-    assert [test["name"] for test in model.fit["tests"]] == ["test_0.csv", "test_1.csv"]
-    assert model.fit["tests"][0]["sha256"] == hashlib.sha256(sweeps[0].read_bytes()).hexdigest()
-    assert model.fit["bound"]["mean_excess"] >= 1
+    assert model.fit.synthetic is False
+    assert [test.name for test in model.fit.tests] == ["test_0.csv", "test_1.csv"]
+    assert model.fit.tests[0].sha256 == hashlib.sha256(sweeps[0].read_bytes()).hexdigest()
+    assert model.fit.bound.mean_excess >= 1
     assert str(tmp_path) not in output.read_text(encoding="utf-8")
 
 
@@ -81,7 +84,7 @@ def test_raw_and_frequency_response_together(tmp_path: Path) -> None:
     files = [data / "synthetic_test_1_raw.csv", data / "synthetic_test_1_frf.csv"]
     result = _fit(*files, "--modes", 2, "--output", output)
     assert result.exit_code == 0, result.output
-    assert read_model(output).fit["synthetic"] is True
+    assert read_model(output).fit.synthetic is True
 
 
 def test_the_same_bytes_twice_and_its_figure(tmp_path: Path, sweeps: list[Path]) -> None:
@@ -146,8 +149,8 @@ def test_structure_loss_and_order_of_the_bound_as_asked(tmp_path: Path, sweeps: 
     asked = ["--modes", "1/2", "--real", "1/0", "--integrators", 1, "--loss", "soft-l1", "--bound-order", 3]
     assert _fit(*sweeps, *asked, "--output", output).exit_code == 0
     model = read_model(output)
-    assert model.fit["structure"] == "1 integrator, 1 zero mode, 2 pole modes, 1 real zero"
-    assert model.fit["loss"] == "soft-L1"
+    assert model.fit.structure == "1 integrator, 1 zero mode, 2 pole modes, 1 real zero"
+    assert model.fit.loss == "soft-L1"
     assert model.additive_bound.order == 3
     assert model.plant.integrators == 1
     assert len(model.plant.real_zeros) == 1

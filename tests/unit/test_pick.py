@@ -12,13 +12,12 @@ from nehari import nehari_excess
 from design.blocks.ball import UndecidedError, decided, negative_pivot, polynomial_roots
 from design.blocks.block import Block
 from design.chapter_2.design_delay_free import stabiliser_problem
-from design.hinf.closed_loop_norm import closed_loop_norm
+from design.hinf.closed_loop_norm import closed_loop_norm, closed_loop_poles
 from design.hinf.mixed_sensitivity import Synthesis, mixed_sensitivity
 from identification.base.digits import lower_end, upper_end
-from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, Mode, PlantModel
 
-Case = tuple[IdentifiedModel, float, float]  # model, period, epsilon
+Case = tuple[PlantModel, AdditiveBound, float, float]  # plant, bound, period, epsilon
 
 
 def random_case(seed: int) -> Case:
@@ -46,12 +45,12 @@ def random_case(seed: int) -> Case:
         (float(corners[4]),) if order % 2 else (),
     )
     epsilon = float((reference * 10 ** rng.uniform(-3, -0.5)) ** 2)
-    return IdentifiedModel(plant, bound, None, {}), float(2 * np.pi / reference), epsilon
+    return plant, bound, float(2 * np.pi / reference), epsilon
 
 
 def in_units(case: Case, time: float, gain: float) -> Case:
     """The same plant in another unit of time and of its output."""
-    model, period, epsilon = case
+    plant, bound, period, epsilon = case
 
     def modes(old: tuple[Mode, ...]) -> tuple[Mode, ...]:
         return tuple(Mode(mode.omega / time, mode.zeta) for mode in old)
@@ -68,12 +67,12 @@ def in_units(case: Case, time: float, gain: float) -> Case:
             real_zeros=rates(part.real_zeros),
             real_poles=rates(part.real_poles),
         )
-        for part, factor in ((model.plant, gain / time), (model.additive_bound, gain))
+        for part, factor in ((plant, gain / time), (bound, gain))
     ]
-    return IdentifiedModel(*scaled, None, {}), period * time, epsilon / time**2
+    return *scaled, period * time, epsilon / time**2
 
 
-def synthesise(case: Case) -> Synthesis:
+def synthesise(case: Case) -> tuple[Block, Synthesis]:
     _, problem = stabiliser_problem(*case)
     return mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
 
@@ -81,7 +80,7 @@ def synthesise(case: Case) -> Synthesis:
 def in_old_units(K: Block, case: Case, time: float, gain: float) -> Block:
     """K back from the units of :func:`in_units`; G_A = B/Lambda has B(0) = gain/time and a monic Lambda."""
     zeros, poles = (tuple(root * time for root in roots) for roots in (K.zeros, K.poles))
-    degree = max(4, 2 * len(case[0].plant.zero_modes))
+    degree = max(4, 2 * len(case[0].zero_modes))
     return Block(K.gain * time**K.relative_degree * time ** (degree - 1) * gain, zeros, poles)
 
 
@@ -89,26 +88,26 @@ def in_old_units(K: Block, case: Case, time: float, gain: float) -> Block:
 def test_what_is_proved_is_true(seed: int) -> None:
     """The lower bounds and the achieved norms of random plants; gamma_lower against Nehari's theorem in 60 digits."""
     _, problem = stabiliser_problem(*random_case(seed))
-    found = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
+    K, found = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
     assert nehari_excess(problem.W1, problem.W2, found.gamma_lower, 60) > 0
     assert nehari_excess(problem.W1, problem.W2, found.gamma_lower * (1 + 1.01e-4), 60) < 0
     assert found.gamma_line_lower <= found.gamma_line <= 1.01 * found.gamma_line_lower
     assert found.gamma_lower <= found.gamma
-    assert max(pole.real for pole in found.closed_loop_poles) < -problem.decay_rate
+    assert max(pole.real for pole in closed_loop_poles(problem.G, K)) < -problem.decay_rate
 
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("time", "gain"), [(2.0**30, 1.0), (2.0**-30, 2.0**50), (1.0, 2.0**-50)])
 def test_powers_of_two_as_units_change_no_bit(seed: int, time: float, gain: float) -> None:
     case = random_case(seed)
-    old, new = synthesise(case), synthesise(in_units(case, time, gain))
+    (old_K, old), (new_K, new) = synthesise(case), synthesise(in_units(case, time, gain))
     assert (new.gamma_lower, new.gamma, new.gamma_line_lower, new.gamma_line) == (
         old.gamma_lower,
         old.gamma,
         old.gamma_line_lower,
         old.gamma_line,
     )
-    assert in_old_units(new.K, case, time, gain) == old.K
+    assert in_old_units(new_K, case, time, gain) == old_K
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -117,12 +116,12 @@ def test_powers_of_two_as_units_change_no_bit(seed: int, time: float, gain: floa
 )
 def test_the_design_is_the_same_in_any_units(seed: int, time: float, gain: float) -> None:
     case = random_case(seed)
-    old, new = synthesise(case), synthesise(in_units(case, time, gain))
+    (old_K, old), (new_K, new) = synthesise(case), synthesise(in_units(case, time, gain))
     for name in ("gamma_lower", "gamma", "gamma_line_lower", "gamma_line"):
         assert getattr(new, name) == pytest.approx(getattr(old, name), rel=1e-9)
-    K = in_old_units(new.K, case, time, gain)
-    assert K.gain == pytest.approx(old.K.gain, rel=1e-9)
-    for there, here in ((K.zeros, old.K.zeros), (K.poles, old.K.poles)):
+    K = in_old_units(new_K, case, time, gain)
+    assert K.gain == pytest.approx(old_K.gain, rel=1e-9)
+    for there, here in ((K.zeros, old_K.zeros), (K.poles, old_K.poles)):
         assert len(there) == len(here)
         distances = np.abs(np.subtract.outer(np.array(there), np.array(here))).min(axis=0)
         assert np.all(distances <= 1e-9 * np.abs(here))
@@ -147,8 +146,8 @@ def test_an_infimum_that_rounding_misplaced() -> None:
     bound = AdditiveBound.printed_form(
         0.00015889051248297724, 92.07582172960379, 417.1357314232856, 0.025453737556454782
     )
-    _, problem = stabiliser_problem(IdentifiedModel(plant, bound, None, {}), 13.390762610209944, 1e-4)
-    found = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
+    _, problem = stabiliser_problem(plant, bound, 13.390762610209944, 1e-4)
+    _, found = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
     assert 0.0148981 / (1 + 2e-4) < found.gamma_lower < 0.0148981
     assert nehari_excess(problem.W1, problem.W2, found.gamma_lower, 60) > 0
     assert nehari_excess(problem.W1, problem.W2, 0.0149032, 60) < 0
@@ -159,7 +158,7 @@ def test_a_plant_far_faster_than_its_reference(period: float) -> None:
     """One real pole at 3e6 rad/s and W_a as far: eight decades between the slowest root and the fastest."""
     plant = PlantModel(3419.083098809311, (), (), 0.0, 1, (1709.6918018767112,), (3078760.8005179977,))
     bound = AdditiveBound.printed_form(0.3967886428549875, 595489.4621034386, 3078760.8005179977, 0.548136899856326)
-    found = synthesise((IdentifiedModel(plant, bound, None, {}), period, 1e-4))
+    _, found = synthesise((plant, bound, period, 1e-4))
     assert found.gamma_line <= 1.01 * found.gamma_line_lower
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from design.blocks.block import bound_block, plant_block
 from identification.base.errors import InputError
-from identification.model.model_file import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
+from identification.model.model_file import IdentifiedModel, read_model
 from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.plant_json import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
 
 S = 1j * np.geomspace(0.1, 100, 50)
 PLANT = PlantModel(
@@ -69,3 +71,21 @@ def test_what_is_no_plant(change: dict[str, object], sentence: str) -> None:
 def test_a_bound_needs_a_pole() -> None:
     with pytest.raises(InputError, match="expected one pole or more"):
         AdditiveBound(1.0, (), ())
+
+
+def test_a_model_whose_fit_says_less_is_read(tmp_path: Path) -> None:
+    path, bound = tmp_path / "model.json", AdditiveBound.printed_form(1.0, 2.0, 3.0, 0.1)
+    model = IdentifiedModel(PLANT, bound, tuple(float(k) for k in range(len(PLANT.parameters))))
+    path.write_text(model.to_json(), encoding="utf-8")
+    assert read_model(path) == model
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["fit"] = {"source": "identification fit", "structure": "1 integrator"}
+    del content["standard_errors"]["zero_modes"][0]
+    path.write_text(json.dumps(content), encoding="utf-8")
+    assert read_model(path) == IdentifiedModel(PLANT, bound)
+
+
+def test_parameters_are_named() -> None:
+    assert [parameter.name for parameter in PLANT.parameters][:3] == ["gain", "zero_omega_1", "zero_zeta_1"]
+    assert PLANT.parameters[1].label == "zero mode 1, omega [rad/s]"
+    assert (PLANT.parameters[-1].name, PLANT.parameters[-1].label) == ("delay_s", "delay [s]")

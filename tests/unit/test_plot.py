@@ -17,7 +17,7 @@ from paper_figures.look.bode import decibel, draw_distance, draw_phase, draw_rel
 
 PLANT = PlantModel(-2.0, (Mode(50.0, 0.03),), (Mode(80.0, 0.02),), 0.05)
 BOUND = AdditiveBound.printed_form(0.3, 40.0, 60.0, 0.2)
-MODEL = IdentifiedModel(PLANT, BOUND, None, {})
+MODEL = IdentifiedModel(PLANT, BOUND)
 OMEGA = np.linspace(10.0, 300.0, 200)
 SWEEP = FrequencyResponse(OMEGA, 1.1 * PLANT(1j * OMEGA), None, "a.csv")
 

@@ -70,14 +70,12 @@ def test_f_of_a_plant_that_once_showed_the_opposite() -> None:
     plant = PlantModel(19.416211763234617, (), (Mode(64.83351679861622, 0.006065211741852967),), 0.04289450322705625)
     plant = PlantModel(plant.gain, (Mode(13.998610151745932, 0.0081),), plant.pole_modes, plant.delay_s)
     bound = AdditiveBound(0.0930769359974999, (), (), (), (23.246528149884053,))
-    model = IdentifiedModel(plant, bound, None, {})
     times = (0.08, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
-    found = [
-        design_extended(model, [1.5], 4.0, [(2.0, 1.0)], recovery_s=time).anti_windup["corrected"] for time in times
-    ]
-    assert [facts["bandwidth"] for facts in found] == pytest.approx([64.83351679861622] * len(times))
-    assert all(np.diff([facts["f"] for facts in found]) <= 2 * WORTH * found[0]["f"])
-    assert all(facts["recovery_s"] <= time * (1 + 1e-9) for facts, time in zip(found, times, strict=True))
+    found = [design_extended(plant, bound, [1.5], 4.0, [(2.0, 1.0)], recovery_s=time).corrected for time in times]
+    judged = [each.judgement for each in found]
+    assert [each.bandwidth for each in found] == pytest.approx([64.83351679861622] * len(times))
+    assert all(np.diff([each.f for each in judged]) <= 2 * WORTH * judged[0].f)
+    assert all(each.recovery_s <= time * (1 + 1e-9) for each, time in zip(judged, times, strict=True))
 
 
 @settings(max_examples=15, deadline=None)
@@ -125,17 +123,16 @@ def test_a_whole_extended_design_in_other_units(
         model = IdentifiedModel(
             PlantModel(2.0 * k / T, (zero,), (pole,), 0.01 * T),
             AdditiveBound.printed_form(gain * k, corner / T, omega / T, zeta),
-            None,
-            {},
         )
         factors = [(e / T, f / T**2) for e, f, _ in pairs]
-        design = design_extended(model, omegas / T, 2.0 / T, factors, robust_level=level)
-        found = {"roll_off": design.parameters.get("roll_off", 0.0) * T}
-        for name, facts in design.anti_windup.items():
-            found[name + " f"] = facts["f"] / k
-            found[name + " sector"] = facts["popov_sector"] or np.inf
-            found[name + " at zero"] = facts["theta1_tilde_at_zero"]
-            found[name + " recovery"] = facts["recovery_s"] / T
+        design = design_extended(model.plant, model.additive_bound, omegas / T, 2.0 / T, factors, robust_level=level)
+        rolled = design.free.roll_off
+        found = {"roll_off": rolled.rate * T if rolled is not None and rolled.order else 0.0}
+        for name, each in design.anti_windup.items():
+            found[name + " f"] = each.judgement.f / k
+            found[name + " sector"] = each.judgement.popov_sector or np.inf
+            found[name + " at zero"] = each.judgement.theta1_tilde_at_zero
+            found[name + " recovery"] = each.judgement.recovery_s / T
         return found
 
     try:

@@ -265,7 +265,7 @@ def test_tracking_floor(implied: IdentifiedModel, extended_design: Design) -> No
     without = dataclasses.replace(plant, integrators=0)
     assert tracking_floor(without, bound, [0.0]) == pytest.approx(bound.gain / plant.gain, rel=1e-12)
     # attained at the reference's frequency, exceeded elsewhere
-    omega = extended_design.parameters.get("reference_omegas", [1.5])[0]
+    omega = extended_design.reference_omegas[0]
     loop = delay_loop(extended_design, plant)
     s = np.array([1j * omega * (1 + 1e-7)])
     inner = 1 - loop.feedback(s) * np.exp(-loop.delay_s * s)
@@ -287,7 +287,7 @@ def models(draw: st.DrawFn) -> IdentifiedModel:
     gain = draw(st.sampled_from([-1.0, 1.0])) * draw(st.floats(0.1, 30.0))
     plant = PlantModel(gain, tuple(modes[:count]), tuple(modes[count:]), draw(st.sampled_from([1e-3, 8e-3, 0.05])))
     bound = AdditiveBound.printed_form(0.002 * abs(gain), 20.0, draw(st.floats(100.0, 500.0)), 0.02)
-    return IdentifiedModel(plant, bound, None, {})
+    return IdentifiedModel(plant, bound)
 
 
 @some
@@ -301,7 +301,7 @@ def models(draw: st.DrawFn) -> IdentifiedModel:
 def test_margins_of_random_extended_designs(
     model: IdentifiedModel, omega: float, a: float, mismatch: float, detuned: bool
 ) -> None:
-    design = design_extended(model, reference_omegas=[omega], a=a, pairs=[(2.0, 1.0)])
+    design = design_extended(model.plant, model.additive_bound, reference_omegas=[omega], a=a, pairs=[(2.0, 1.0)])
     plant = dataclasses.replace(model.plant, delay_s=mismatch * model.plant.delay_s)
     if detuned:  # so that the controller's zeros and poles no longer cancel the plant's
         plant = dataclasses.replace(

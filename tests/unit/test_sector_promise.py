@@ -126,7 +126,7 @@ def test_the_line_of_the_readme(extended_design: Design) -> None:
     assert not found.covered
     assert found.largest_control == pytest.approx(569.3, abs=0.1)
     assert found.largest_steady == pytest.approx(AMPLITUDE, rel=1e-3)
-    k = extended_design.anti_windup["corrected"]["popov_sector"]
+    k = extended_design.corrected.judgement.popov_sector
     assert found.guarantee.sector == pytest.approx(k, abs=1e-4)
     assert found.covered_control == pytest.approx((12 - k * AMPLITUDE) / (1 - k), rel=3e-3)
     assert found.needed_sector == pytest.approx(0.987, abs=5e-4)
@@ -184,7 +184,7 @@ def test_the_promise_is_kept(extended_design: Design, phase: float, limit: float
 
 def test_the_promise_is_kept_within_the_bound(implied: IdentifiedModel) -> None:
     """The same for plants within W_a, v and v_s being those of each one's own linear loop."""
-    design = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.5)
+    design = design_extended(implied.plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.5)
     kind = design.compensator("corrected")
     given_within = guarantee_within(design, kind)
     assert 0.9 < given_within.sector < circle_sector(kind.theta1_tilde)
@@ -232,7 +232,7 @@ def test_the_circle_criterion_by_brute_force(gamma: float, beta: float) -> None:
 def test_the_thesiss_compensator_has_no_guarantee(extended_design: Design) -> None:
     """Popov's condition holds for any sector, but by a multiplier, and theta2 integrates."""
     kind = extended_design.compensator("thesis")
-    assert extended_design.anti_windup["thesis"]["popov_sector"] is None
+    assert extended_design.thesis.judgement.popov_sector is None
     given_one = guarantee(extended_design, kind)
     assert given_one.sector == 0
     assert "theta2 is not stable" in given_one.missing
@@ -269,15 +269,13 @@ LIMIT_CYCLE = IdentifiedModel(
         (3955.6636938837983,),
         (),
     ),
-    None,
-    {},
 )
 
 
 @pytest.fixture(scope="module")
 def limit_cycle() -> Design:
     """Its corrected anti-windup does not let a step of 1 settle under +-5."""
-    return design_extended(LIMIT_CYCLE, reference_omegas=[0.0], a=20.0, pairs=[])
+    return design_extended(LIMIT_CYCLE.plant, LIMIT_CYCLE.additive_bound, reference_omegas=[0.0], a=20.0, pairs=[])
 
 
 def said(command: str, design: Design, folder: Path, *arguments: str) -> str:

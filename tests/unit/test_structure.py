@@ -8,6 +8,7 @@ import pytest
 from identification.fitting.least_squares import response_of
 from identification.fitting.likelihood import Likely
 from identification.fitting.neighbouring_structures import neighbours, reached_from, within_band
+from identification.model.plant_json import shaped
 from identification.model.structure import Structure, Wanted
 
 OMEGA = np.geomspace(0.3, 3.0, 40)
@@ -31,12 +32,12 @@ def test_parameters_and_plant_are_the_same() -> None:
     theta[-1] = 0.2
     plant = structure.plant(theta, -1.0)
     np.testing.assert_allclose(plant(1j * OMEGA), -response_of(structure, theta, OMEGA), rtol=1e-13)
-    values = np.array([value for _, value in structure.parameters(plant)])
+    values = np.array([parameter.value for parameter in plant.parameters])
     np.testing.assert_allclose(values, np.append(np.exp(theta[:-1]), 0.2) * np.where(np.arange(10) == 0, -1, 1))
-    shaped = structure.to_dict(np.arange(10.0))
-    assert shaped["zero_modes"] == [{"omega": 1.0, "zeta": 2.0}]
-    assert shaped["pole_modes"] == [{"omega": 3.0, "zeta": 4.0}, {"omega": 5.0, "zeta": 6.0}]
-    assert (shaped["real_zeros"], shaped["real_poles"], shaped["delay_s"]) == ([7.0], [8.0], 9.0)
+    found = shaped(plant, np.arange(10.0))
+    assert found["zero_modes"] == [{"omega": 1.0, "zeta": 2.0}]
+    assert found["pole_modes"] == [{"omega": 3.0, "zeta": 4.0}, {"omega": 5.0, "zeta": 6.0}]
+    assert (found["real_zeros"], found["real_poles"], found["delay_s"]) == ([7.0], [8.0], 9.0)
 
 
 def test_order_sorts_the_modes_and_nothing_else() -> None:

@@ -11,8 +11,9 @@ import pytest
 from held_plant import PLANTS, held_response
 
 from data.thesis import model_named
-from identification.fitting.subspace_check import SubspaceCheck, check_modes
+from identification.fitting.subspace_check import check_modes
 from identification.model.plant import Mode, PlantModel
+from identification.model.reports import SubspaceCheck
 from identification.sweeps.read_sweeps import read_sweeps
 from identification.sweeps.response import Record
 

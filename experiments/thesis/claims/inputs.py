@@ -10,8 +10,8 @@ import pandas as pd
 
 from data.thesis import THESIS, printed
 from experiments.thesis.claims.printed_number import PrintedNumber, read_number
-from identification.model.model_file import plant_from_dict
 from identification.model.plant import PlantModel
+from identification.model.plant_json import plant_from_dict
 
 Inputs = Mapping[str, float]
 

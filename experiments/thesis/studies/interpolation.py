@@ -13,7 +13,6 @@ from design.chapters_3_4.interpolate_Q import Conditions, StableFunction, by_pol
 from design.chapters_3_4.smith_predictor import free_part
 from design.design_file import Design
 from identification.base.errors import InputError
-from identification.model.model_file import number
 
 FREQUENCIES = 161
 SENSITIVITY = 2.0  # ||S|| above it, a modulus margin below 1/2, counts as a failure
@@ -42,9 +41,7 @@ def interpolation_tables(design: Design) -> dict[str, pd.DataFrame]:
         a, delay_s. ``interpolation_map``: omega_delay, a_delay, stable: whether the poles design gives a stable Q
         depends on omega T_d and a T_d only.
     """
-    if design.kind != "extended":
-        raise InputError(f"the design is '{design.kind}'; expected 'extended'")
-    a, delay_s = number(design.parameters, "a"), design.plant.delay_s
+    a, delay_s = design.free.a, design.plant.delay_s
     top = max(100 * a, 3 * math.pi / delay_s if delay_s else 0.0)
     rows = [
         {"omega": omega, "method": name} | _judge(method, float(omega), delay_s, a)

@@ -14,7 +14,6 @@ from design.anti_windup.thesis_compensator import least_f
 from design.blocks.block import plant_block
 from design.design_file import Design
 from identification.base.errors import InputError
-from identification.model.model_file import IdentifiedModel, number
 
 SECTORS = (0.9, 0.95, 0.99, 0.999)
 RECOVERIES = 9  # recovery times, from the fastest that the bandwidth leaves room for
@@ -37,8 +36,7 @@ def trade_off_tables(design: Design, tick: Callable[[], object] = lambda: None) 
         row for thesis, least (the best found of (2.23) within the bandwidth), corrected: f, popov_sector (empty: any),
         recovery_s, lasting_offset (of a windup of 1; empty: it grows).
     """
-    facts = design.anti_windup["corrected"]
-    bandwidth, own = number(facts, "bandwidth"), number(facts, "recovery_s")
+    bandwidth, own = design.corrected.bandwidth, design.corrected.judgement.recovery_s
     bound = design.additive_bound
     unstable = plant_block(design.plant).unstable_poles
     rows = []
@@ -50,14 +48,13 @@ def trade_off_tables(design: Design, tick: Callable[[], object] = lambda: None) 
                 f = np.nan
             rows.append((sector, recovery_s, f, bandwidth))
             tick()
-    model = IdentifiedModel(design.plant, bound, None, {})
     alpha, beta, gamma, _ = least_f(bound, bandwidth)
     kinds = {
         "thesis": design.compensator("thesis"),
         "least": second_order(alpha, beta, gamma),
         "corrected": design.compensator("corrected"),
     }
-    summary = [{"run": name} | vars(judge(model, kind)) for name, kind in kinds.items()]
+    summary = [{"run": name} | vars(judge(design.plant, bound, kind)) for name, kind in kinds.items()]
     columns = ["run", "f", "popov_sector", "recovery_s", "lasting_offset"]
     return {
         "trade_off": pd.DataFrame(rows, columns=["sector", "recovery_s", "f", "bandwidth"]),

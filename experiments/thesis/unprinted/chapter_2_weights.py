@@ -16,7 +16,8 @@ from scipy.optimize import brentq
 from data.thesis import printed
 from design.blocks.block import Block
 from design.design_file import Design
-from design.hinf.mixed_sensitivity import SynthesisError, mixed_sensitivity
+from design.hinf.mixed_sensitivity import mixed_sensitivity
+from design.hinf.pick import SynthesisError
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.physical_limits.integrator_bound import least_peak_error
 from experiments.runs.batch import Tick, threaded
@@ -93,18 +94,18 @@ def with_weights(design: Design, weights: Weights) -> Design:
         See :func:`design.hinf.mixed_sensitivity.mixed_sensitivity`.
     """
     assert design.hinf is not None
-    W1, W2, decay_rate = (design.hinf[name] for name in ("W1", "W2", "decay_rate"))
+    W1, W2, decay_rate = design.hinf.W1, design.hinf.W2, design.hinf.decay_rate
     damped = tuple(complex(weights.damping * pole.real, pole.imag) for pole in W1.poles)
     flat = float(np.prod(np.abs(damped)) / np.prod(np.abs(W1.poles)))
     corner = -design.additive_bound.corner
     moved = tuple(weights.corner * zero if abs(zero - corner) < 1e-9 * abs(corner) else zero for zero in W2.zeros)
-    synthesis = mixed_sensitivity(
+    K, _ = mixed_sensitivity(
         design.blocks["G_A"],
         Block(W1.gain * flat, (), damped),
         Block(W2.gain * weights.level / weights.corner, moved, W2.poles),
         weights.decay * decay_rate,
     )
-    return replace(design, blocks={**design.blocks, "K": synthesis.K})
+    return replace(design, blocks={**design.blocks, "K": K})
 
 
 class Loop(NamedTuple):

@@ -122,7 +122,8 @@ def _nearest(summary: pd.DataFrame, search: str) -> pd.DataFrame:
     """The three rows of the condition that comes nearest in a joint search, by outcome."""
     rows = _rows(summary, search=search)
     best = rows.iloc[int(rows["worst_miss"].to_numpy().argmin())]
-    return rows[(rows["set"] == best["set"]) & (rows["delay"] == best["delay"])].set_index("outcome")
+    nearest: pd.DataFrame = rows[(rows["set"] == best["set"]) & (rows["delay"] == best["delay"])]
+    return nearest.set_index("outcome")
 
 
 def _joint(summary: pd.DataFrame, search: str) -> str:

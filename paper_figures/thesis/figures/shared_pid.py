@@ -42,7 +42,8 @@ def response(tables: Mapping[str, pd.DataFrame], kind: str, line: str) -> Figure
 
 def last_third(table: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of the last third of the run."""
-    return table[table["time_s"] >= 2 / 3 * table["time_s"].iloc[-1]]
+    rows: pd.DataFrame = table[table["time_s"] >= 2 / 3 * table["time_s"].iloc[-1]]
+    return rows
 
 
 def settling(table: pd.DataFrame, run: str) -> str:

@@ -15,12 +15,11 @@ from design.auditing.as_text import audit_text
 from design.auditing.audit_design import audit
 from design.design_file import Design
 from identification.base.errors import InputError
-from identification.model.model_file import plant_to_dict
 from identification.model.plant import PlantModel
 from identification.output.fit_facts import bound_text
 from paper_figures.look.captions import number
 from paper_figures.summary.of_designs import DESIGNS, FOLLOWING, loop_table, sentences
-from paper_figures.summary.of_fit import Paragraph, Table, fact, paragraphs, parameter_table
+from paper_figures.summary.of_fit import Paragraph, Table, paragraphs, parameter_table, plant_table
 from paper_figures.thesis.report.inputs import Inputs, Picture, experiment_of
 from paper_figures.thesis.report.ledger import Difference, Row, Verdict, differences, row, verdicts
 
@@ -108,9 +107,9 @@ def report_content(inputs: Inputs) -> Content:
 
 def is_fitted(inputs: Inputs) -> bool:
     """Whether the model says that it was fitted to the very sweeps that were given."""
-    if not inputs.tests or "tests" not in inputs.model.fit:
+    if not inputs.tests or inputs.model.fit is None:
         return False
-    return [fact(test, "name") for test in fact(inputs.model.fit, "tests")] == [test.name for test in inputs.tests]
+    return [test.name for test in inputs.model.fit.tests] == [test.name for test in inputs.tests]
 
 
 def figure_label(name: str) -> str:
@@ -152,16 +151,7 @@ def _figure(inputs: Inputs, name: str, synthetic: bool) -> Figure:
 
 def _values(plant: PlantModel) -> Table:
     """The parameters of a plant that was not fitted here."""
-    values = plant_to_dict(plant)
-    rows = [("gain K", number(plant.gain, 6), "")]
-    for kind in ("zero", "pole"):
-        modes = values[f"{kind}_modes"]
-        rows += [
-            (f"{kind} mode {i}, omega [rad/s]", number(mode["omega"], 6), number(mode["zeta"], 6))
-            for i, mode in enumerate(modes, 1)
-        ]
-        rows += [(f"real {kind} [rad/s]", number(rate, 6), "") for rate in values[f"real_{kind}s"]]
-    return Table(("parameter", "value", "zeta"), (*rows, ("delay h [s]", number(plant.delay_s, 6), "")))
+    return plant_table(plant, [(number(parameter.value, 6),) for parameter in plant.parameters], ("value",))
 
 
 def _not_fitted(inputs: Inputs) -> tuple[Paragraph, ...]:

@@ -67,8 +67,8 @@ def other_chapter_2() -> Design:
     assert design.hinf is not None
     (omega,) = design.reference_omegas
     poles = (-3 * DECAY_RATE + 1j * omega, -3 * DECAY_RATE - 1j * omega, complex(-3 * DECAY_RATE))
-    synthesis = mixed_sensitivity(design.blocks["G_A"], Block(1.0, (), poles), design.hinf["W2"], DECAY_RATE)
-    return replace(design, blocks={**design.blocks, "K": synthesis.K})
+    K, _ = mixed_sensitivity(design.blocks["G_A"], Block(1.0, (), poles), design.hinf.W2, DECAY_RATE)
+    return replace(design, blocks={**design.blocks, "K": K})
 
 
 DESIGNS: dict[str, Callable[[], Design]] = {"ours": chapter_2, "others": other_chapter_2}

@@ -8,7 +8,7 @@ from data.thesis import printed
 from design.chapters_3_4.interpolate_Q import by_zeros, conditions
 from experiments.thesis.claims.inputs import Inputs, plant_of
 from experiments.thesis.studies.f_gamma import f_gamma_tables
-from identification.model.model_file import bound_from_dict
+from identification.model.plant_json import bound_from_dict
 
 
 def table_2_1(inputs: Inputs) -> dict[str, float]:

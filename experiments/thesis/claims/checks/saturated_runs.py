@@ -127,9 +127,8 @@ def _recovery(share: float, limit: float) -> float:
     """``extended.recovery_s`` under +-limit of a design for the plant with this share of its dead time."""
     design = chapter_4()
     model = model_named("implied")
-    shorter = replace(model, plant=replace(model.plant, delay_s=share * model.plant.delay_s))
-    chosen = design.parameters
-    other = design_extended(shorter, design.reference_omegas, chosen["a"], chosen["pairs"])
+    shorter = replace(model.plant, delay_s=share * model.plant.delay_s)
+    other = design_extended(shorter, model.additive_bound, design.reference_omegas, design.free.a, design.free.pairs)
     reference = thesis_reference("extended", design.reference_omegas)
     loop = design_loop(other, reference, other.compensator("thesis"))
     return last_saturation(simulate(loop, (-limit, limit), np.array([0.0, PERIODS * reference.period_s])))

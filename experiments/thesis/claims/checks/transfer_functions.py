@@ -12,8 +12,8 @@ from design.chapter_2.internal_model import InternalModel, internal_model
 from design.chapters_3_4.interpolate_Q import by_zeros, conditions
 from design.chapters_3_4.smith_predictor import FreePart, anti_windup_controller, augmented_plant, free_part, stabiliser
 from experiments.thesis.claims.inputs import Inputs, plant_of
-from identification.model.model_file import bound_from_dict
 from identification.model.plant import PlantModel
+from identification.model.plant_json import bound_from_dict
 
 LOW = 0.1j  # s = j omega, rad/s: where the gain of a form that leaves factors out is read off
 

@@ -1,0 +1,131 @@
+"""JSON files of a known schema: their objects, members and numbers, each refused with a sentence if it is not there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import Field, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from identification.base.errors import InputError
+from identification.base.files import read_text
+
+Record = TypeVar("Record")
+Reader = Callable[[Mapping[str, Any], str], Any]
+"""What a member of an object holds, given the object and the member's name."""
+
+
+def read_json(path: Path, schema: int) -> dict[str, Any]:
+    """Read a JSON object whose member ``schema`` must have the given value.
+
+    Raises
+    ------
+    InputError
+        No such file, not JSON, not an object, or another schema.
+    """
+    text = read_text(path)
+    try:
+        content = json.loads(text, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{path}, line {error.lineno}: not JSON ({error.msg})") from None
+    except (RecursionError, ValueError) as error:  # an InputError among them
+        raise InputError(f"{path}: {error}") from None
+    found = content.get("schema") if isinstance(content, dict) else None
+    if not isinstance(content, dict) or found != schema:
+        raise InputError(f"{path}: schema is {found!r}; expected {schema}")
+    return content
+
+
+def record(kind: type[Record], content: Mapping[str, Any], readers: Mapping[str, Reader] | None = None) -> Record:
+    """Read a dataclass from the members of an object that have the names of its fields.
+
+    Parameters
+    ----------
+    kind
+        The dataclass. A field is a number, a text, a truth value, one of these or None, or of a type in ``readers``.
+    content
+        The object; it may have other members.
+    readers
+        Type of a field, as it is annotated -> how such a member is read.
+
+    Raises
+    ------
+    InputError
+        A member is missing or not of its field's type.
+    """
+    known = READERS | dict(readers or {})
+    all_fields: tuple[Field[Any], ...] = fields(kind)  # type: ignore[arg-type]
+    return kind(**{field.name: known[str(field.type)](content, field.name) for field in all_fields})
+
+
+def member(content: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    """Return the JSON object at ``key``; raises InputError when there is none."""
+    value = content.get(key)
+    if not isinstance(value, Mapping):
+        raise InputError(f"'{key}' is {value!r}; expected an object")
+    return value
+
+
+def objects(content: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
+    """Return the list of JSON objects at ``key``; raises InputError when there is none."""
+    values = content.get(key)
+    if not isinstance(values, list) or not all(isinstance(value, Mapping) for value in values):
+        raise InputError(f"'{key}' is {values!r}; expected a list of objects")
+    return values
+
+
+def number(content: Mapping[str, Any], key: str) -> float:
+    """Return the number at ``key``; raises InputError when there is none."""
+    value = content.get(key)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"'{key}' is {value!r}; expected a number")
+    try:
+        return float(value)
+    except OverflowError:
+        raise InputError(f"'{key}' is an integer too large for a number") from None
+
+
+def numbers(content: Mapping[str, Any], key: str) -> tuple[float, ...]:
+    """Return the list of numbers at ``key``; raises InputError when there is none."""
+    values = content.get(key)
+    if not isinstance(values, list):
+        raise InputError(f"'{key}' is {values!r}; expected a list of numbers")
+    return tuple(number({key: value}, key) for value in values)
+
+
+def whole(content: Mapping[str, Any], key: str) -> int:
+    """Return the whole number at ``key``; raises InputError when there is none."""
+    value = content.get(key)
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise InputError(f"'{key}' is {value!r}; expected a whole number")
+    return value
+
+
+def words(content: Mapping[str, Any], key: str) -> str:
+    """Return the text at ``key``; raises InputError when there is none."""
+    value = content.get(key)
+    if not isinstance(value, str):
+        raise InputError(f"'{key}' is {value!r}; expected a text")
+    return value
+
+
+def truth(content: Mapping[str, Any], key: str) -> bool:
+    """Return the truth value at ``key``; raises InputError when there is none."""
+    value = content.get(key)
+    if not isinstance(value, bool):
+        raise InputError(f"'{key}' is {value!r}; expected true or false")
+    return value
+
+
+def or_none(reader: Reader) -> Reader:
+    """The reader of a member that may be null; one that is missing is refused as ``reader`` refuses it."""
+    return lambda content, key: None if key in content and content[key] is None else reader(content, key)
+
+
+READERS: dict[str, Reader] = {"float": number, "int": whole, "str": words, "bool": truth}
+READERS |= {f"{name} | None": or_none(reader) for name, reader in READERS.items()}
+
+
+def _refuse_constant(name: str) -> float:
+    raise InputError(f"holds {name}; expected finite numbers only")

@@ -1,0 +1,165 @@
+"""What is reported of a fit beside the plant: how W_a lies over the residuals, and what a subspace model finds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from identification.base.json_object import Reader, member, objects, or_none, record
+from identification.model.plant import AdditiveBound
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Where W_a is nearly as small as a residual.
+
+    Parameters
+    ----------
+    omega
+        In rad/s.
+    test
+        The name of the test whose residual it is.
+    between_lines
+        The residual is that of the test's own fit.
+    ratio
+        Of |W_a| over the residual, 1 or little more.
+    """
+
+    omega: float
+    test: str
+    between_lines: bool
+    ratio: float
+
+
+@dataclass(frozen=True)
+class Excess:
+    """|W_a| over an envelope, as ratios.
+
+    Parameters
+    ----------
+    largest, largest_omega
+        The largest, and where it is in rad/s.
+    mean
+        Geometric, with equal weight for equal log frequency.
+    """
+
+    largest: float
+    largest_omega: float
+    mean: float
+
+
+@dataclass(frozen=True)
+class BoundReport:
+    """W_a and how tight it is.
+
+    Parameters
+    ----------
+    bound
+        At least |P - test| at every line of every test, and at least the distance between P and the test's own fit
+        on a grid between the lines.
+    largest_excess, mean_excess
+        Of |W_a| over the envelope of all residuals, at the lines, at the frequencies between them where W_a is fitted,
+        and around its own modes.
+    least_excess
+        No W_a of this order that covers the residuals has a smaller largest excess, as multipliers prove in ball
+        arithmetic for the residuals and envelope as computed; 1 says nothing.
+    at_lines, between_lines
+        Over the envelope of the tests' residuals at their lines, and over that of their fits' distances between the
+        lines; the latter is None without fits, or when none differs from P.
+    touches
+        Where W_a is nearly as small as a residual, the closest first; of those side by side only the closest.
+    """
+
+    bound: AdditiveBound
+    largest_excess: float
+    mean_excess: float
+    least_excess: float
+    at_lines: Excess
+    between_lines: Excess | None
+    touches: tuple[Touch, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The ``bound`` of what a fit writes: W_a's order in place of W_a, which the model holds."""
+        rest = asdict(self)
+        del rest["bound"]
+        return {"order": self.bound.order} | rest
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any], bound: AdditiveBound) -> BoundReport:
+        """Read what :meth:`to_dict` writes of a bound; raises InputError when a member is missing."""
+
+        def excess(of: Mapping[str, Any], key: str) -> Excess:
+            return record(Excess, member(of, key))
+
+        readers: dict[str, Reader] = {
+            "AdditiveBound": lambda members, key: bound,
+            "Excess": excess,
+            "Excess | None": or_none(excess),
+            "tuple[Touch, ...]": lambda members, key: tuple(record(Touch, each) for each in objects(members, key)),
+        }
+        return record(cls, content, readers)
+
+
+@dataclass(frozen=True)
+class ModeCheck:
+    """One mode of the plant and the nearest one of the subspace model.
+
+    Parameters
+    ----------
+    kind
+        ``zero`` or ``pole``.
+    omega, zeta
+        The plant's; rad/s.
+    found_omega, found_zeta
+        The subspace model's nearest, None where none is within a tenth of omega in the s plane.
+    """
+
+    kind: str
+    omega: float
+    zeta: float
+    found_omega: float | None
+    found_zeta: float | None
+
+
+@dataclass(frozen=True)
+class SubspaceCheck:
+    """What a subspace model of the raw record says of the plant's modes.
+
+    Parameters
+    ----------
+    order
+        Number of states.
+    sampling_s
+        Sampling interval in seconds of the record as it was used.
+    modes
+        Zero modes, then pole modes, of those that oscillate within the band; none when there is no answer.
+    reason
+        Why there is no answer, or None.
+    """
+
+    order: int
+    sampling_s: float
+    modes: tuple[ModeCheck, ...]
+    reason: str | None = None
+
+    def __str__(self) -> str:
+        if self.reason is not None:
+            return f"N4SID of order {self.order}: no answer ({self.reason})"
+        words = []
+        for mode in self.modes:
+            if mode.found_omega is None or mode.found_zeta is None:
+                words.append(f"no {mode.kind} near {mode.omega:.5g} rad/s")
+            else:
+                change = f"{100 * (mode.found_omega / mode.omega - 1):+.2g} %"
+                words.append(f"{mode.kind} {mode.found_omega:.5g} rad/s ({change}), zeta {mode.found_zeta:.3g}")
+        return f"N4SID of order {self.order}: " + ("; ".join(words) or "the plant has no mode in the band to check")
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> SubspaceCheck:
+        """Read an entry of ``subspace_check``; raises InputError when a member is missing."""
+
+        def modes(of: Mapping[str, Any], key: str) -> tuple[ModeCheck, ...]:
+            return tuple(record(ModeCheck, mode) for mode in objects(of, key))
+
+        return record(cls, content, {"tuple[ModeCheck, ...]": modes})
