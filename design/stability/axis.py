@@ -24,7 +24,7 @@ Judge = Callable[[Real, Real], Whole]  # of the same; NO_ZERO, ... for each cell
 
 
 def sign_of(value: Real, slope: Real, bounds: Jet) -> Whole:
-    """What is known of a real function on cells, as a code for :func:`cells`: whether it has a zero there.
+    """What is known of a real function on cells, as a code for :func:`judged_cells`: whether it has a zero there.
 
     ``value`` and ``slope`` are a real or imaginary part of ``bounds``, which bounds the rest.
     """
@@ -45,7 +45,7 @@ def first_edges(roots: tuple[complex, ...], top: float) -> Real:
     return np.concatenate([[0.0], np.geomspace(lowest, top, 2 + int(np.log2(top / lowest)))])
 
 
-def cells(judge: Judge, edges: Real) -> tuple[Real, Real, Whole]:
+def judged_cells(judge: Judge, edges: Real) -> tuple[Real, Real, Whole]:
     """Halve the cells between ``edges`` until each is judged; left ends, right ends and codes by increasing omega.
 
     Raises
@@ -91,7 +91,7 @@ def zeros(real: Callable[[Real], tuple[Real, Real]], judge: Judge, edges: Real) 
     A cell with ONE_ZERO has a zero where the signs at its ends differ. Neighbouring cells that rounding leaves open
     are one cell, which is treated alike: what turns back within the rounding of the function is no crossing.
     """
-    left, right, code = cells(judge, edges)
+    left, right, code = judged_cells(judge, edges)
     joined = np.flatnonzero((code[1:] == OPEN) & (code[:-1] == OPEN))
     left, right, code = np.delete(left, joined + 1), np.delete(right, joined), np.delete(code, joined)
     ends = np.union1d(left, right)
@@ -138,7 +138,7 @@ def turn(function: Callable[[Real, Real], tuple[Jet, Jet, Jet]], edges: Real) ->
         code[whole.is_clear_of_zero] = NO_ZERO
         return code
 
-    left, right, code = cells(judge, edges)
+    left, right, code = judged_cells(judge, edges)
     if np.any(code == OPEN):
         return float("nan")
     ends = np.append(left, right[-1])
@@ -175,8 +175,8 @@ def peak(numerator: Function, denominator: Function, edges: Real, best: float) -
             least, where, width = float(square[at]), float(centre[at]), 2 * float(half[at])
         return np.where(upper > (1 + precision) * least, HALVE, NO_ZERO)
 
-    cells(judge, edges)
+    judged_cells(judge, edges)
     if where is not None:
         precision = SHARPER
-        cells(judge, np.array([max(where - width, 0.0), where + width]))
+        judged_cells(judge, np.array([max(where - width, 0.0), where + width]))
     return float(np.sqrt(least)), where

@@ -7,7 +7,7 @@ import numpy as np
 from design.blocks.block import plant_block
 from design.blocks.frequency_peak import frequency_grid
 from design.design_file import Design
-from design.stability.axis import HALVE, NO_ZERO, cells
+from design.stability.axis import HALVE, NO_ZERO, judged_cells
 from design.stability.characteristic_roots import closing_omega, largest_beyond, roots_right_of
 from design.stability.jet import combined, jet
 from design.stability.margins import delay_loop, responses
@@ -67,7 +67,7 @@ class PerturbedLoop:
             return np.where(clear, NO_ZERO, HALVE)
 
         self._top = closing_omega(self.loop, 0.0, 1.0, NEGLIGIBLE)
-        _, followed, _ = cells(judge, axis.edges(self._top))
+        _, followed, _ = judged_cells(judge, axis.edges(self._top))
         block = plant_block(self.plant)
         roots = (*block.zeros, *block.poles, *self.loop.forward.zeros, *self.loop.forward.poles)
         grid = frequency_grid(roots, per_decade=20)

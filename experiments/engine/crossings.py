@@ -120,7 +120,7 @@ def _root(g: Array, lo: float, hi: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def leave(
+def leaves_mode(
     U: Array, degree: int, mode: int, on_limit: int, stuck: bool, low: float, high: float, reach: float
 ) -> tuple[float, int, int]:
     """Where on (0, reach] a control leaves its mode, the mode that it enters, and the limit on which it is then.

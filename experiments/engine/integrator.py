@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from experiments.engine.compiled_loop import CompiledLoop
-from experiments.engine.crossings import leave
+from experiments.engine.crossings import leaves_mode
 from experiments.engine.kinks import BEYOND, Past, drop, images, shift
 from experiments.engine.signals import change, driven, expand, fill, unfold
 from experiments.engine.step_table import NEGLIGIBLE, NOTHING, advance, dot, times, whole_lanes
@@ -189,7 +189,7 @@ def integrate(
         if reset < len(reset_times) and t_next == reset_times[reset]:
             whole = False  # it ends there to the last digit
         reach = 1.0 if whole else max((t_next - t - late) / step, 0.0)
-        exit_at, entered, crossed = leave(U, degree, mode, on_limit, standing > 2, low, high, reach)
+        exit_at, entered, crossed = leaves_mode(U, degree, mode, on_limit, standing > 2, low, high, reach)
         late_next = 0.0
         if exit_at >= 0 or whole:
             reach = exit_at if exit_at >= 0 else 1.0

@@ -71,7 +71,7 @@ def insert(queue: Array, queued: int, t: float, near: float) -> int:
 
 
 @njit(cache=True, nogil=True)
-def gap(
+def largest_difference(
     left: Array, left_degree: int, moved: float, right: Array, right_degree: int, radius: float, work: Array
 ) -> float:
     """The most that two polynomials differ within ``radius`` steps of where the right one starts.
@@ -108,7 +108,7 @@ def images(
             for i in range(before + 1):
                 W[i] = history[left, j, i]
         read = delays[j] / step if brief[j] else BEYOND
-        if gap(W, before, moved, history[this, j], degrees[this], read, work) > negligible[1 + j]:
+        if largest_difference(W, before, moved, history[this, j], degrees[this], read, work) > negligible[1 + j]:
             queued = insert(queue, queued, t + delays[j], 1e-13 * (step + t))
     return queued
 

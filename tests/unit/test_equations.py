@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from data.thesis import model_named, printed
+from data.thesis import model_named, printed_numbers
 from design.anti_windup.compensator import AntiWindup, second_order, uncertainty_cost
 from design.blocks.block import Block, plant_block, plant_denominator, plant_numerator
 from design.blocks.frequency_peak import peak
@@ -809,7 +809,7 @@ def test_4_9_the_bound_printed_again() -> None:
 
 
 def test_tables_4_1_and_4_2_as_printed() -> None:
-    chosen = printed()["extended"]
+    chosen = printed_numbers()["extended"]
     assert (chosen["a"], chosen["e"], chosen["f"]) == (4, 2, 1)
     Q = by_zeros(conditions([chosen["reference"]["omega"]], 8.1e-3, chosen["a"]), [(chosen["e"], chosen["f"])])
     for found, as_printed, half in zip(Q.numerator, (6.2496, 6.89, 4.1296), (5e-5, 5e-3, 5e-5), strict=True):
