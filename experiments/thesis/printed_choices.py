@@ -23,7 +23,7 @@ def chapter_2(set_name: str = "implied") -> Design:
     """
     chosen = printed_numbers()["delay_free"]
     model = model_named(set_name)
-    return design_delay_free(model.plant, model.additive_bound, chosen["reference"]["period_s"], chosen["epsilon"])
+    return design_delay_free(model, chosen["reference"]["period_s"], chosen["epsilon"])
 
 
 @cache
@@ -38,7 +38,7 @@ def chapter_4(set_name: str = "implied") -> Design:
     chosen = printed_numbers()["extended"]
     omega, pairs = chosen["reference"]["omega"], [(chosen["e"], chosen["f"])]
     model = model_named(set_name)
-    return design_extended(model.plant, model.additive_bound, [omega], chosen["a"], pairs)
+    return design_extended(model, [omega], chosen["a"], pairs)
 
 
 def thesis_reference(kind: str, omegas: Sequence[float]) -> Reference:

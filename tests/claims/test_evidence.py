@@ -31,7 +31,7 @@ from identification.model.model_file import IdentifiedModel
 @pytest.fixture(scope="module")
 def delay_free_design(implied: IdentifiedModel) -> Design:
     chosen = printed_numbers()["delay_free"]
-    return design_delay_free(implied.plant, implied.additive_bound, chosen["reference"]["period_s"], chosen["epsilon"])
+    return design_delay_free(implied, chosen["reference"]["period_s"], chosen["epsilon"])
 
 
 @pytest.fixture(scope="module")

@@ -201,7 +201,7 @@ def test_the_controller_output_exceeds_the_limits_by_little(weights: str):
 def test_the_printed_bound_guarantees_nothing(name: str, peak: float, at: float | None):
     """For the set behind the printed transfer functions; for Table 2.1 as printed it does, with zeta_n1 = 0.08."""
     model = model_named(name)
-    design = design_extended(model.plant, model.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
+    design = design_extended(model, [1.5], 4.0, [(2.0, 1.0)])
     found = margins_of(delay_loop(design, design.loop_plant), model.additive_bound).W_a_C_S
     assert found.value == pytest.approx(peak, abs=0.005)
     assert at is None or found.omega == pytest.approx(at, rel=1e-3)
@@ -360,7 +360,7 @@ def test_other_printed_numbers_turn_their_statements(inputs: Inputs, monkeypatch
 
 def test_another_design_turns_its_statements(inputs: Inputs, implied: IdentifiedModel, monkeypatch: pytest.MonkeyPatch):
     """A robust redesign keeps what is stable and equal, and is robust."""
-    redesigned = design_extended(implied.plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9)
+    redesigned = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9)
     before = smith_predictor(inputs)
     monkeypatch.setattr("experiments.thesis.claims.checks.statements.chapter_4", lambda: redesigned)
     after = smith_predictor(inputs)

@@ -37,7 +37,8 @@ fi
 if [ -e "$here/$command.crashes" ]; then echo "Traceback of $command" >&2; exit 1; fi
 echo "$said" >> "$here/log"
 case $room in
-identification | design) touch "$output" ;;
+identification) touch "${output%/*}/model.json" "$output" ;;
+design) touch "$output" ;;
 experiments)
     [ $command != campaign ] || { touch "$output"; exit; }
     name=${command//-/_}

@@ -123,7 +123,7 @@ def designs(implied: IdentifiedModel, extended_design: Design) -> list[Design]:
     """Extended designs of the thesis's plant and of a random one with a longer dead time."""
     plant = dataclasses.replace(random_plant(np.random.default_rng(7)), delay_s=0.04)
     bound = AdditiveBound.printed_form(0.0015 * plant.gain, 20.0, 280.0, 0.01)
-    return [extended_design, design_extended(plant, bound, [2.5], 3.0, [(3.0, 2.0)])]
+    return [extended_design, design_extended(IdentifiedModel(plant, bound), [2.5], 3.0, [(3.0, 2.0)])]
 
 
 # section 2.1

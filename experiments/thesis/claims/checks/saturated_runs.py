@@ -128,7 +128,7 @@ def _recovery(share: float, limit: float) -> float:
     design = chapter_4()
     model = model_named("implied")
     shorter = replace(model.plant, delay_s=share * model.plant.delay_s)
-    other = design_extended(shorter, model.additive_bound, design.reference_omegas, design.free.a, design.free.pairs)
+    other = design_extended(replace(model, plant=shorter), design.reference_omegas, design.free.a, design.free.pairs)
     reference = thesis_reference("extended", design.reference_omegas)
     loop = design_loop(other, reference, other.compensator("thesis"))
     return last_saturation(simulate(loop, (-limit, limit), np.array([0.0, PERIODS * reference.period_s])))
