@@ -38,7 +38,7 @@ def read_responses(path: Path) -> list[FrequencyResponse]:
         The file is missing or of another kind.
     """
     try:
-        with np.load(path, allow_pickle=False) as kept:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
             content: dict[str, Any] = dict(kept)
         return [
             FrequencyResponse(
