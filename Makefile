@@ -36,6 +36,9 @@ drawn = $(foreach name,$(1),$(addprefix $(FIGURES)/$(name).,pdf svg png txt))
 FITTED := $(BUILD)/model.json
 CHOSEN := $(or $(MODEL),$(FITTED))
 MODEL_FILE := $(filter-out table implied,$(CHOSEN))
+# The fit keeps the responses of its tests; what comes after reads these, and for another MODEL the sweeps themselves.
+RESPONSES := $(BUILD)/responses.npz
+TESTS = $(if $(MODEL),$(SWEEPS),$(RESPONSES))
 CHOICE := $(BUILD)/choice.txt
 of_model = $(filter-out pid% conditions%,$(1))
 
@@ -133,13 +136,13 @@ endef
 design = $(eval $(call rule,$(1),design,$(2) --output $(1)))
 tables = $(eval TABLES += $(1))$(eval \
 	$(call rule,$(call csv,$(1)),$(or $(3),experiments thesis),$(2) --output $(RESULTS)))
-INPUTS = $(MODEL_FILE) $(SWEEP_FILES) $(DESIGNS) $(CAMPAIGN)
+INPUTS = $(MODEL_FILE) $(SWEEP_FILES) $(RESPONSES) $(DESIGNS) $(CAMPAIGN)
 LIMITS := $(if $(LIMIT),--limit $(LIMIT))
 
-$(FITTED): $(SWEEP_FILES) $(CODE-identification-fit) $(if $(MODEL),,$(CHOICE)) | $(READY)
-	$(if $(REFIT),@rm -rf $@ $(SUMMARY) $(REPORT) $(call drawn,$(OF_MODEL)) $(BUILD)/design_* \
+$(FITTED) $(RESPONSES) &: $(SWEEP_FILES) $(CODE-identification-fit) $(if $(MODEL),,$(CHOICE)) | $(READY)
+	$(if $(REFIT),@rm -rf $(FITTED) $(RESPONSES) $(SUMMARY) $(REPORT) $(call drawn,$(OF_MODEL)) $(BUILD)/design_* \
 		$(patsubst %,$(RESULTS)/%*,$(call of_model,$(TABLES))))
-	$(PY) -m identification fit $(SWEEPS) $(FIT) --output $@
+	$(PY) -m identification fit $(SWEEPS) $(FIT) --output $(FITTED) --responses $(RESPONSES)
 
 # With the thesis's references and free parameters; the last has a roll-off, so that W_a guarantees its stability.
 DELAY_FREE := $(BUILD)/design_delay_free.json
@@ -152,7 +155,7 @@ $(call design,$(ROBUST),extended $(CHOSEN) --reference-omega 1.5 --a 4 --e 2 --f
 
 $(call tables,pid pid_summary,pid)
 $(call tables,conditions conditions_summary,conditions)
-$(call tables,additive_error additive_error_summary,additive-error $(CHOSEN) $(SWEEPS))
+$(call tables,additive_error additive_error_summary,additive-error $(CHOSEN) $(TESTS))
 $(call tables,f_gamma f_gamma_summary,f-gamma $(EXTENDED))
 $(call tables,delay_free delay_free_summary,delay-free $(DELAY_FREE) $(LIMITS))
 $(call tables,extended extended_summary,extended $(EXTENDED) $(LIMITS))
@@ -178,10 +181,10 @@ $(foreach name,$(NAMES),$(eval $(call drawn,$(name)): $(CODE-$(name)) $(call csv
 $(call drawn,%): $(CODE-paper_figures-draw) | $(READY)
 	$(call run,$(call drawn,$*),paper_figures,draw $* --results $(RESULTS) --output $(FIGURES))
 
-$(SUMMARY) &: $(FITTED) $(CHOICE) $(SWEEP_FILES) $(DESIGNS) $(call csv,$(call of_model,$(TABLES))) \
+$(SUMMARY) &: $(FITTED) $(RESPONSES) $(CHOICE) $(DESIGNS) $(call csv,$(call of_model,$(TABLES))) \
 		$(CODE-paper_figures-summary) | $(READY)
-	$(PY) -m paper_figures summary $(FITTED) $(SWEEPS) --build $(BUILD)
+	$(PY) -m paper_figures summary $(FITTED) $(RESPONSES) --build $(BUILD)
 
-$(REPORT): $(filter %.svg %.txt,$(call drawn,$(NAMES))) $(BUILD)/claims.csv $(MODEL_FILE) $(CHOICE) $(SWEEP_FILES) \
+$(REPORT): $(filter %.svg %.txt,$(call drawn,$(NAMES))) $(BUILD)/claims.csv $(MODEL_FILE) $(CHOICE) $(filter $(SWEEP_FILES) $(RESPONSES),$(TESTS)) \
 		$(DESIGNS) $(call csv,$(TABLES)) $(CODE-paper_figures-report) | $(READY)
-	$(PY) -m paper_figures report $(CHOSEN) $(SWEEPS) --build $(BUILD)
+	$(PY) -m paper_figures report $(CHOSEN) $(TESTS) --build $(BUILD)

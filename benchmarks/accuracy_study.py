@@ -61,7 +61,7 @@ class Entry:
 def design_at(delay_s: float) -> Design:
     model = model_named("implied")
     plant = dataclasses.replace(model.plant, delay_s=delay_s)
-    return design_extended(plant, model.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
+    return design_extended(dataclasses.replace(model, plant=plant), [1.5], 4.0, [(2.0, 1.0)])
 
 
 def references(horizon_s: float) -> dict[str, Reference | SampledReference]:

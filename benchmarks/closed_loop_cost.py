@@ -96,7 +96,7 @@ def random_plant(pairs: int, seed: int) -> PlantModel:
 
 def saturated_loop(model: IdentifiedModel) -> tuple[SaturatedLoop, float]:
     """The chapter 4 loop with the corrected anti-windup, and a limit that it saturates at and can follow within."""
-    design = design_extended(model.plant, model.additive_bound, [OMEGA], 4.0, [(2.0, 1.0)])
+    design = design_extended(model, [OMEGA], 4.0, [(2.0, 1.0)])
     reference = thesis_reference("extended", [OMEGA])
     limit = 1.2 * reference.required(model.plant).value
     return design_loop(design, reference, design.compensator("corrected")), limit

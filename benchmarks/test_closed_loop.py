@@ -38,7 +38,7 @@ PADE_S = 10.0  # python-control takes seconds for each second
 @pytest.fixture(scope="module")
 def design() -> Design:
     model = model_named("implied")
-    return design_extended(model.plant, model.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
+    return design_extended(model, [1.5], 4.0, [(2.0, 1.0)])
 
 
 @pytest.fixture(scope="module")

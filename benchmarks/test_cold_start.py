@@ -34,7 +34,7 @@ with styled():
 def design_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("cold") / "design.json"
     model = model_named("implied")
-    design = design_extended(model.plant, model.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
+    design = design_extended(model, [1.5], 4.0, [(2.0, 1.0)])
     path.write_text(design.to_json(), encoding="utf-8")
     return path
 

@@ -4,7 +4,8 @@
 >>> Mode = identification.Mode
 >>> plant = identification.PlantModel(7.0, (Mode(200.0, 0.05),), (Mode(300.0, 0.02),), delay_s=0.01)
 >>> bound = identification.AdditiveBound.printed_form(gain=0.01, corner=100.0, omega=300.0, zeta=0.1)
->>> own = design.extended(plant, bound, reference_omegas=[1.5], a=4.0, pairs=[(2.0, 1.0)])
+>>> model = identification.IdentifiedModel(plant, bound)
+>>> own = design.extended(model, reference_omegas=[1.5], a=4.0, pairs=[(2.0, 1.0)])
 >>> own
 Design(extended, reference at 1.5 rad/s, anti-windups thesis, corrected)
 >>> round(design.audit(own).margins.modulus.value, 3)

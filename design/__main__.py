@@ -85,7 +85,7 @@ def delay_free(
     from design.chapter_2.design_delay_free import design_delay_free
 
     given = model_named(model)
-    design = design_delay_free(given.plant, given.additive_bound, period, epsilon, recovery, sector, bandwidth)
+    design = design_delay_free(given, period, epsilon, recovery, sector, bandwidth)
     hinf = design.hinf
     assert hinf is not None
     unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
@@ -144,8 +144,7 @@ def extended(
     pairs = list(zip(e, f, strict=True))
     given = model_named(model)
     design = design_extended(
-        given.plant,
-        given.additive_bound,
+        given,
         omegas,
         a,
         pairs,

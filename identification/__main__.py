@@ -5,6 +5,7 @@ The command imports what it runs, so that a command line answers at once.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -66,6 +67,11 @@ def main() -> None:
     show_default=True,
     help="Of W_a; 2 is Eq. (2.22).",
 )
+@click.option(
+    "--responses",
+    type=click.Path(path_type=Path),
+    help="Keep the responses in this .npz, to be given as a SWEEP later.",
+)
 @click.option("--seed", default=0, type=click.IntRange(min=0), show_default=True, help="Of the random restarts.")
 def fit(
     sweeps: tuple[Path, ...],
@@ -76,6 +82,7 @@ def fit(
     loss: str,
     bound_order: int,
     seed: int,
+    responses: Path | None,
 ) -> None:
     """Fit gain, integrators, modes, real roots and dead time to SWEEP files (raw records or frequency responses)."""
     from tqdm import tqdm
@@ -83,6 +90,7 @@ def fit(
     from identification.fit_model import fit_model
     from identification.model.structure import Wanted
     from identification.output.fit_facts import bound_remarks, bound_text, check_lines, table
+    from identification.sweeps.kept_responses import write_responses
     from identification.sweeps.read_sweeps import input_files, read_sweeps
 
     tests = read_sweeps(sweeps)
@@ -91,7 +99,10 @@ def fit(
         soft = loss == "soft-l1"
         fitted = fit_model(tests, wanted, soft=soft, bound_order=bound_order, seed=seed, tick=bar.update)
     text = fitted.model.to_json()
-    write_whole({output: lambda path: path.write_text(text, encoding="utf-8")}, inputs=input_files(sweeps))
+    writers: dict[Path, Callable[[Path], object]] = {output: lambda path: path.write_text(text, encoding="utf-8")}
+    if responses is not None:
+        writers[responses] = lambda path: write_responses(path, fitted.tests)
+    write_whole(writers, inputs=input_files(sweeps))
     bound = [bound_text(fitted.model.additive_bound), *bound_remarks(fitted.bound_fit)]
     click.echo("\n".join([table(fitted.plant_fit), *bound, *check_lines(fitted.checks)]))
 

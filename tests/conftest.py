@@ -26,10 +26,10 @@ def table() -> IdentifiedModel:
 @pytest.fixture(scope="session")
 def extended_design(implied: IdentifiedModel) -> Design:
     """Chapter 4 with the printed free parameters."""
-    return design_extended(implied.plant, implied.additive_bound, reference_omegas=[1.5], a=4.0, pairs=[(2.0, 1.0)])
+    return design_extended(implied, reference_omegas=[1.5], a=4.0, pairs=[(2.0, 1.0)])
 
 
 @pytest.fixture(scope="session")
 def delay_free_design(implied: IdentifiedModel) -> Design:
     """Chapter 2 with the printed period and epsilon."""
-    return design_delay_free(implied.plant, implied.additive_bound, period_s=4.0, epsilon=1e-4)
+    return design_delay_free(implied, period_s=4.0, epsilon=1e-4)

@@ -14,7 +14,7 @@ THESIS = Path(__file__).resolve().parent
 
 
 @cache
-def printed() -> dict[str, Any]:
+def printed_numbers() -> dict[str, Any]:
     """Return data/thesis/thesis.toml as nested dictionaries; its comments give the units and the places in print.
 
     Table 4.1 and what else the thesis chose, as printed.
@@ -33,7 +33,7 @@ def model_named(name: str) -> IdentifiedModel:
     InputError
         See :func:`identification.model.model_file.read_model`.
     """
-    plants = printed()["plants"]
+    plants = printed_numbers()["plants"]
     if name not in plants:
         return read_model(Path(name))
-    return IdentifiedModel(plant_from_dict(plants[name]), bound_from_dict(printed()["additive_bound"]))
+    return IdentifiedModel(plant_from_dict(plants[name]), bound_from_dict(printed_numbers()["additive_bound"]))

@@ -5,18 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from design.anti_windup.compensator import AntiWindup, from_one_plus, uncertainty_cost
 from design.anti_windup.corrected_program import CorrectedProgram, Vertex
 from design.anti_windup.popov import meets_circle_criterion
 from design.blocks.block import Block, bound_block
 from design.blocks.frequency_peak import searched_norm
-from identification.base.arrays import Real
+from identification.base.arrays import Real, Whole
 from identification.base.errors import InputError
 from identification.model.plant import AdditiveBound
-
-Whole = NDArray[np.int64]
 
 SETTLED = 0.01  # what is left of y_d after the recovery time
 RATES = 48  # values of the rate in a decade

@@ -16,7 +16,7 @@ from design.chapters_3_4.smith_predictor import anti_windup_controller, smith_co
 from design.design_file import Design
 from design.hinf.mixed_sensitivity import Infimum, Synthesis, assess, infimum
 from design.parameters import ExtendedParameters
-from design.stability.axis import HALVE, NO_ZERO, cells, first_edges
+from design.stability.axis import HALVE, NO_ZERO, first_edges, judged_cells
 from design.stability.characteristic_roots import CharacteristicRoots, largest_beyond, rightmost_roots
 from design.stability.jet import jet
 from design.stability.margins import Margins, delay_loop, margins_of, responses, tracking_floor
@@ -177,7 +177,7 @@ def covered_delay(plant: PlantModel, bound: AdditiveBound) -> float:
         best = min(best, float(np.min(_shift(here, centre))))
         return np.where(_shift(least, at) < (1 - CERTAIN) * best, HALVE, NO_ZERO)
 
-    cells(judge, first_edges(share.zeros + share.poles, top))
+    judged_cells(judge, first_edges(share.zeros + share.poles, top))
     return float((1 - CERTAIN) * best)
 
 

@@ -70,9 +70,7 @@ def peak(magnitude: Callable[[Real], Real], roots: Iterable[complex]) -> tuple[f
     values = magnitude(grid)
     if not np.all(np.isfinite(values)):
         return float("inf"), float(grid[~np.isfinite(values)][0])
-    at, heights = refined_maxima(magnitude, grid, values)
-    best = int(np.argmax(heights))
-    return float(heights[best]), float(at[best])
+    return _highest(magnitude, grid, values)
 
 
 def refined_maxima(function: Callable[[Real], Real], grid: Real, values: Real) -> tuple[Real, Real]:
@@ -104,6 +102,13 @@ def refined_maxima(function: Callable[[Real], Real], grid: Real, values: Real) -
         heights = np.where(better, found[row, best], heights)
         low, high = inside[row, np.maximum(best - 1, 0)], inside[row, np.minimum(best + 1, POINTS - 1)]
     return at, heights
+
+
+def _highest(function: Callable[[Real], Real], grid: Real, values: Real) -> tuple[float, float]:
+    """The highest of the refined maxima, and where it lies."""
+    at, heights = refined_maxima(function, grid, values)
+    best = int(np.argmax(heights))
+    return float(heights[best]), float(at[best])
 
 
 def searched_norm(block: Block) -> tuple[float, float]:
@@ -157,13 +162,12 @@ def block_norm(block: Block) -> tuple[float, float]:
         if at is None:
             return value, omega
         near = math.sqrt(at) * np.linspace(1 - 1e-3, 1 + 1e-3, POINTS)
-        at_there, heights = refined_maxima(magnitude, near, magnitude(near))
-        best = int(np.argmax(heights))
-        if not heights[best] > value * (1 + CERTIFIED / 2):
+        higher = _highest(magnitude, near, magnitude(near))
+        if not higher[0] > value * (1 + CERTIFIED / 2):
             raise InputError(
                 f"the norm {value:g} of a block, at {omega:g} rad/s, could not be proved; expected better damped roots"
             )
-        value, omega = float(heights[best]), float(at_there[best])
+        value, omega = higher
 
 
 def _magnitude(block: Block) -> Callable[[Real], Real]:

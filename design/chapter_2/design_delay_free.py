@@ -16,6 +16,7 @@ from design.hinf.mixed_sensitivity import mixed_sensitivity
 from design.hinf.pick import Problem
 from design.parameters import DelayFreeParameters
 from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, PlantModel
 
 TRACKING = 0.01  # W1 asks for |S| below gamma times this at the reference's frequencies
@@ -67,8 +68,7 @@ def stabiliser_problem(
 
 
 def design_delay_free(
-    plant: PlantModel,
-    bound: AdditiveBound,
+    model: IdentifiedModel,
     period_s: float,
     epsilon: float,
     recovery_s: float | None = None,
@@ -79,7 +79,7 @@ def design_delay_free(
 
     Parameters
     ----------
-    plant, bound
+    model
         P (its dead time is ignored, as the thesis does) and W_a.
     period_s
         Period of the sinusoidal reference in seconds.
@@ -102,6 +102,7 @@ def design_delay_free(
     C = K A/Lambda has a zero at the plant's pole s = 0 (A(0) = 0; Lemma 1 assumes a stable A): the integrator is
     hidden from the loop and not stabilised, so that a constant disturbance at the plant's input makes y drift.
     """
+    plant, bound = model.plant, model.additive_bound
     units, problem = stabiliser_problem(plant, bound, period_s, epsilon)
     K, synthesis = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
     own_s = math.log(1 / SETTLED) / (2 * problem.decay_rate)

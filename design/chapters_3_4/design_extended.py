@@ -16,12 +16,11 @@ from design.choices import SECTOR
 from design.design_file import Design
 from design.parameters import ExtendedParameters, Quotient, RollOff
 from identification.base.errors import InputError
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.model_file import IdentifiedModel
 
 
 def design_extended(
-    plant: PlantModel,
-    bound: AdditiveBound,
+    model: IdentifiedModel,
     reference_omegas: Sequence[float],
     a: float,
     pairs: Sequence[tuple[float, float]],
@@ -35,11 +34,11 @@ def design_extended(
     """Chapters 3 and 4: Q, C_0, T_so, F1, F2, K_0, K_1, K, theta1~ and theta2.
 
     What holds 1 + F = 1 - T_so exp(-T_d s) is no block: C_aw, G_A and theta1 are functions of
-    :mod:`design.smith_predictor`.
+    :mod:`design.chapters_3_4.smith_predictor`.
 
     Parameters
     ----------
-    plant, bound
+    model
         P with its dead time, and W_a.
     reference_omegas
         Angular frequencies of the reference in rad/s; 0 is a constant.
@@ -64,6 +63,7 @@ def design_extended(
         A number is out of its range, the method gives an unstable Q, the level cannot be met, or the plant is not of
         the class.
     """
+    plant, bound = model.plant, model.additive_bound
     wanted = conditions(reference_omegas, plant.delay_s, a)
     designs = {
         "zeros": lambda: by_zeros(wanted, pairs),

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from design.stability.jet import Jet, known
-from identification.base.arrays import Real
+from identification.base.arrays import Real, Whole
 from identification.base.errors import InputError
 
 CELLS = 4_000_000  # at most, that one search may look at
@@ -21,11 +20,11 @@ NO_ZERO, ONE_ZERO, OPEN, HALVE = range(4)  # of a cell: none; at most one; round
 
 
 Function = Callable[[Real, Real], Jet]  # of centre and half in rad/s, (n,) each
-Judge = Callable[[Real, Real], NDArray[np.int_]]  # of the same; NO_ZERO, ... for each cell
+Judge = Callable[[Real, Real], Whole]  # of the same; NO_ZERO, ... for each cell
 
 
-def sign_of(value: Real, slope: Real, bounds: Jet) -> NDArray[np.int_]:
-    """What is known of a real function on cells, as a code for :func:`cells`: whether it has a zero there.
+def sign_of(value: Real, slope: Real, bounds: Jet) -> Whole:
+    """What is known of a real function on cells, as a code for :func:`judged_cells`: whether it has a zero there.
 
     ``value`` and ``slope`` are a real or imaginary part of ``bounds``, which bounds the rest.
     """
@@ -46,7 +45,7 @@ def first_edges(roots: tuple[complex, ...], top: float) -> Real:
     return np.concatenate([[0.0], np.geomspace(lowest, top, 2 + int(np.log2(top / lowest)))])
 
 
-def cells(judge: Judge, edges: Real) -> tuple[Real, Real, NDArray[np.int_]]:
+def judged_cells(judge: Judge, edges: Real) -> tuple[Real, Real, Whole]:
     """Halve the cells between ``edges`` until each is judged; left ends, right ends and codes by increasing omega.
 
     Raises
@@ -56,7 +55,7 @@ def cells(judge: Judge, edges: Real) -> tuple[Real, Real, NDArray[np.int_]]:
     """
     left, right = edges[:-1], edges[1:]
     lowest, looked_at = NARROW * edges[min(1, len(edges) - 1)], 0
-    kept: list[tuple[Real, Real, NDArray[np.int_]]] = []
+    kept: list[tuple[Real, Real, Whole]] = []
     while len(left):
         looked_at += len(left)
         if looked_at > CELLS:
@@ -92,7 +91,7 @@ def zeros(real: Callable[[Real], tuple[Real, Real]], judge: Judge, edges: Real) 
     A cell with ONE_ZERO has a zero where the signs at its ends differ. Neighbouring cells that rounding leaves open
     are one cell, which is treated alike: what turns back within the rounding of the function is no crossing.
     """
-    left, right, code = cells(judge, edges)
+    left, right, code = judged_cells(judge, edges)
     joined = np.flatnonzero((code[1:] == OPEN) & (code[:-1] == OPEN))
     left, right, code = np.delete(left, joined + 1), np.delete(right, joined), np.delete(code, joined)
     ends = np.union1d(left, right)
@@ -131,7 +130,7 @@ def turn(function: Callable[[Real, Real], tuple[Jet, Jet, Jet]], edges: Real) ->
     does so and is larger than the second: then the function turns with it, to a right angle.
     """
 
-    def judge(centre: Real, half: Real) -> NDArray[np.int_]:
+    def judge(centre: Real, half: Real) -> Whole:
         whole, main, rest = function(centre, half)
         code = np.full(centre.shape, HALVE)
         code[half * whole.steepness < whole.noise] = OPEN
@@ -139,7 +138,7 @@ def turn(function: Callable[[Real, Real], tuple[Jet, Jet, Jet]], edges: Real) ->
         code[whole.is_clear_of_zero] = NO_ZERO
         return code
 
-    left, right, code = cells(judge, edges)
+    left, right, code = judged_cells(judge, edges)
     if np.any(code == OPEN):
         return float("nan")
     ends = np.append(left, right[-1])
@@ -158,7 +157,7 @@ def peak(numerator: Function, denominator: Function, edges: Real, best: float) -
     """
     least, where, width, precision = best**2, None, 0.0, PRECISION
 
-    def judge(centre: Real, half: Real) -> NDArray[np.int_]:
+    def judge(centre: Real, half: Real) -> Whole:
         nonlocal least, where, width
         n, d = numerator(centre, half), denominator(centre, half)
         with np.errstate(all="ignore"):
@@ -176,8 +175,8 @@ def peak(numerator: Function, denominator: Function, edges: Real, best: float) -
             least, where, width = float(square[at]), float(centre[at]), 2 * float(half[at])
         return np.where(upper > (1 + precision) * least, HALVE, NO_ZERO)
 
-    cells(judge, edges)
+    judged_cells(judge, edges)
     if where is not None:
         precision = SHARPER
-        cells(judge, np.array([max(where - width, 0.0), where + width]))
+        judged_cells(judge, np.array([max(where - width, 0.0), where + width]))
     return float(np.sqrt(least)), where

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebvander
-from numpy.typing import NDArray
 from scipy.linalg import block_diag, eigvals
 
 from design.blocks.block import Block, geometric_scale
@@ -17,7 +16,7 @@ from design.stability.axis import first_edges, turn
 from design.stability.coprime import Terms, evaluate
 from design.stability.delay_loop import DelayLoop
 from design.stability.jet import Jet, combined, delayed, jet
-from identification.base.arrays import Complex, Real
+from identification.base.arrays import Complex, Flags, Real
 from identification.base.errors import InputError
 
 ORDERS = (16, 32, 64, 128, 256, 512)  # of the discretised delay lines, tried in turn
@@ -36,7 +35,7 @@ class CharacteristicRoots(NamedTuple):
     """
 
     roots: Complex
-    hidden: NDArray[np.bool_]
+    hidden: Flags
     uncertainty: Real
     line: float
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from design.blocks.block import Block
 from design.stability.coprime import Terms
-from identification.base.arrays import Complex, Real
+from identification.base.arrays import Complex, Flags, Real
 
 UNIT = 2.0**-50  # rounding of a product or sum, for each of its factors
 
@@ -35,7 +34,7 @@ class Jet(NamedTuple):
         return np.asarray(np.maximum(np.abs(self.value) - self.half * self.steepness, 0.0))
 
     @property
-    def is_clear_of_zero(self) -> NDArray[np.bool_]:
+    def is_clear_of_zero(self) -> Flags:
         """Whether f stays within a disc around its value at the centre that leaves 0 out."""
         return np.asarray(0.9 * np.abs(self.value) > self.half * self.steepness + self.noise)
 

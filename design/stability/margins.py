@@ -135,9 +135,9 @@ def margins_of(loop: DelayLoop, bound: AdditiveBound) -> Margins:
     Notes
     -----
     The ends of the intervals are the crossings of the imaginary axis, the numbers of unstable roots between them are
-    counted once more, :mod:`design.stable_intervals`. The peaks are found by branch and bound on 0 to a frequency
-    Omega, :func:`design.stability.axis.peak`; beyond it 1 - feedback exp(-delay_s s) and 1 + L are bounded, and Omega
-    is doubled until nothing there exceeds the peak by more than TAIL of it.
+    counted once more, :mod:`design.stability.stable_intervals`. The peaks are found by branch and bound on 0 to a
+    frequency Omega, :func:`design.stability.axis.peak`; beyond it 1 - feedback exp(-delay_s s) and 1 + L are bounded,
+    and Omega is doubled until nothing there exceeds the peak by more than TAIL of it.
     """
     outside = tuple(root for root in loop.hidden if root.real >= 0)
     unstable = roots_right_of(loop, 0.0) + sum(root.real > 0 for root in outside)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from identification.base.arrays import Array
+
 Factors = tuple[float, float, int, Array, Array]
 Changes = tuple[float, float, Array, Array]
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from experiments.campaign.distance import Array, Factors, at_the_ends, leading, response
+from experiments.campaign.distance import Factors, at_the_ends, leading, response
+from identification.base.arrays import Array
 
 EPS = np.finfo(float).eps
 SLACK = 1 + 1e-9  # on bounds of derivatives, whose own roundings are below 1e-11

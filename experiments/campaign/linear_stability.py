@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from design.blocks.block import plant_block
 from design.blocks.frequency_peak import frequency_grid
 from design.design_file import Design
-from design.stability.axis import HALVE, NO_ZERO, cells
+from design.stability.axis import HALVE, NO_ZERO, judged_cells
 from design.stability.characteristic_roots import closing_omega, largest_beyond, roots_right_of
 from design.stability.jet import combined, jet
 from design.stability.margins import delay_loop, responses
 from design.stability.stable_intervals import AxisLoop
-from identification.base.arrays import Complex, Real
+from identification.base.arrays import Complex, Real, Whole
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
@@ -62,13 +61,13 @@ class PerturbedLoop:
         axis = AxisLoop(self.loop)
         control = (self.loop.forward * axis.a[0],)
 
-        def judge(centre: Real, half: Real) -> NDArray[np.int_]:
+        def judge(centre: Real, half: Real) -> Whole:
             whole = combined(*axis.both(centre, half), 1.0)
             clear = whole.is_clear_of_zero & jet(control, 0.0, centre, half).is_clear_of_zero
             return np.where(clear, NO_ZERO, HALVE)
 
         self._top = closing_omega(self.loop, 0.0, 1.0, NEGLIGIBLE)
-        _, followed, _ = cells(judge, axis.edges(self._top))
+        _, followed, _ = judged_cells(judge, axis.edges(self._top))
         block = plant_block(self.plant)
         roots = (*block.zeros, *block.poles, *self.loop.forward.zeros, *self.loop.forward.poles)
         grid = frequency_grid(roots, per_decade=20)

@@ -2,17 +2,50 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from experiments.drive.difference_equations import SampledBlock
+from identification.base.arrays import Array
 
 MOST = 1e100  # times the limits, or without limits of a state: beyond it a loop diverges
 ENORMOUS = 1e250  # a state with which no run goes on, whatever the limits
 NEGLIGIBLE = 1e-17  # of the last term of a series, relative to the largest state
+
+
+class Series(NamedTuple):
+    """The plant x' = A x + b i, y = c x, as the series of its state is summed.
+
+    Parameters
+    ----------
+    A, b, c
+        Shapes (n, n), (n,), (n,); without the dead time.
+    norm
+        Of A and b side by side, in 1/s: a series converges at once over less than 1/norm.
+    late, read
+        A command issued at t_k moves the plant on [t_k, t_k + T) of its own, late time, whose state ``read`` seconds
+        into that interval is sampled ``late`` + 1 samples after t_k.
+    """
+
+    A: Array
+    b: Array
+    c: Array
+    norm: float
+    late: int
+    read: float
+
+
+class Actuator(NamedTuple):
+    """Limits, distance of the levels (0 is none) with the lowest and the highest in quanta, and slew a second."""
+
+    low: float
+    high: float
+    quantum: float
+    lowest: float
+    highest: float
+    slew: float
 
 
 @njit(cache=True, nogil=True)
@@ -84,40 +117,57 @@ def _move(
 
 
 @njit(cache=True, nogil=True)
+def _given_out(actuator: Actuator, control: float) -> float:
+    """The control saturated and rounded."""
+    command = min(max(control, actuator.low), actuator.high)
+    if actuator.quantum > 0:
+        command = actuator.quantum * min(max(np.rint(command / actuator.quantum), actuator.lowest), actuator.highest)
+    return command
+
+
+@njit(cache=True, nogil=True)
+def _late(whole: int, now: float, before: float, p: Array, k: int) -> float:
+    """What a dead time gives of p at sample k, see :class:`experiments.drive.difference_equations.SampledBlock`."""
+    value = 0.0
+    if k >= whole:
+        value = now * p[k - whole]
+    if k > whole:
+        value += before * p[k - whole - 1]
+    return value
+
+
+@njit(cache=True, nogil=True)
 def run(
-    A_K: Array, b_K: Array, c_K: Array, d_K: float, A_T: Array, b_T: Array, c_T: Array, d_T: float,
-    A_w: Array, b_w: Array, C_w: Array, d_w: Array, whole: int, now: float, before: float,
-    A: Array, b: Array, c: Array, norm: float, late: int, read: float, T: float,
-    low: float, high: float, quantum: float, lowest: float, highest: float, slew: float, r: Array,
+    forward: SampledBlock, feedback: SampledBlock, theta: SampledBlock, plant: Series, actuator: Actuator, T: float,
+    r: Array,
 ) -> tuple[Array, Array, Array, Array, int]:  # fmt: skip
     """y, u, commands, the actuator's place as each command is issued (s,), and how many samples were reached.
 
-    A command issued at t_k moves the plant on [t_k, t_k + T) of its own, late time, whose state ``read`` seconds into
-    that interval is sampled ``late`` + 1 samples after t_k.
+    ``forward`` maps e to v, ``feedback`` v to what is fed back to it, and ``theta`` u_tilde to what u gives up and to
+    y_d; ``feedback`` and y_d have one dead time, the model's.
     """
+    # out of the tuples, into which a look costs as much as an addition
+    A_K, b_K, c_K, d_K = forward.A, forward.b, forward.C[0], forward.d[0]
+    A_T, b_T, c_T, d_T = feedback.A, feedback.b, feedback.C[0], feedback.d[0]
+    A_w, b_w, C_w, d_w = theta.A, theta.b, theta.C, theta.d
+    A, b, c, norm, late, read = plant
     s = len(r)
     y, u, command, start = np.zeros(s), np.zeros(s), np.zeros(s), np.zeros(s)
     p_T, p_w = np.zeros(s), np.zeros(s)  # T_so v and theta2 u_tilde before their dead time
     x, x_K, x_T, x_w = np.zeros(len(b)), np.zeros(len(b_K)), np.zeros(len(b_T)), np.zeros(len(b_w))
     term, following = np.empty(len(b)), np.empty(max(len(b), len(b_K), len(b_T), len(b_w)))
+    whole, now, before = feedback.whole[0], feedback.now[0], feedback.before[0]
     at_once = now if whole == 0 else 0.0
     around, direct = at_once * d_T, at_once * d_w[1]
     through = d_K * direct / (1 - around)  # u_tilde -> y_d -> v
+    low, high, slew = actuator.low, actuator.high, actuator.slew
     limit = max(abs(low) if np.isfinite(low) else 0.0, abs(high) if np.isfinite(high) else 0.0)
     most_u, most_x = (MOST * limit, ENORMOUS) if limit > 0 else (MOST, MOST)
-    place = min(max(0.0, low), high)
-    if quantum > 0:
-        place = quantum * min(max(np.rint(place / quantum), lowest), highest)
+    place = _given_out(actuator, 0.0)
     for k in range(s):
         p_T[k], p_w[k] = _dot(c_T, x_T), _row(C_w, 1, x_w)
-        fed, y_d = 0.0, 0.0
-        if k >= whole:
-            fed, y_d = now * p_T[k - whole], now * p_w[k - whole]
-        if k > whole:
-            fed += before * p_T[k - whole - 1]
-            y_d += before * p_w[k - whole - 1]
-        e = r[k] - y[k] - y_d
-        v = (_dot(c_K, x_K) + d_K * e + fed) / (1 - around)
+        e = r[k] - y[k] - _late(whole, now, before, p_w, k)
+        v = (_dot(c_K, x_K) + d_K * e + _late(whole, now, before, p_T, k)) / (1 - around)
         u_0 = v - _row(C_w, 0, x_w)
         u_tilde = (u_0 - min(max(u_0, low), high)) / (1 + d_w[0] + through)
         v -= through * u_tilde
@@ -125,11 +175,8 @@ def run(
         u[k] = u_0 - (d_w[0] + through) * u_tilde
         p_T[k] += d_T * v
         p_w[k] += d_w[1] * u_tilde
-        command[k] = min(max(u[k], low), high)
-        if quantum > 0:
-            command[k] = quantum * min(max(np.rint(command[k] / quantum), lowest), highest)
+        command[k], start[k] = _given_out(actuator, u[k]), place
 
-        start[k] = place
         _move(A, b, norm, x, term, following, place, command[k], slew, 0.0, read)
         if k + late + 1 < s:
             y[k + late + 1] = _dot(c, x)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,7 @@ METHODS = ("tustin", "exact")
 WHOLE = 1e-9  # of a sample: a dead time nearer than this to a whole number of samples is one
 
 
-@dataclass(frozen=True)
-class SampledBlock:
+class SampledBlock(NamedTuple):
     """x[k+1] = A x[k] + b i[k], p[k] = C x[k] + d i[k], w[k] = now p[k - whole] + before p[k - whole - 1].
 
     Parameters

@@ -11,7 +11,7 @@ from design.anti_windup.compensator import AntiWindup
 from design.blocks.block import Block, plant_block
 from design.blocks.state_space import realize
 from design.design_file import Design
-from experiments.drive.compiled_steps import run
+from experiments.drive.compiled_steps import Actuator, Series, run
 from experiments.drive.difference_equations import METHODS, SampledBlock, sample_block, split
 from experiments.engine.simulate import MOST_STEPS, DivergenceError
 from experiments.runs.references import Reference, SampledReference
@@ -78,6 +78,12 @@ class Drive:
             return -math.inf, math.inf
         low, high = (end / self.quantum for end in self.limits)
         return float(np.ceil(low - SPARE * abs(low))), float(np.floor(high + SPARE * abs(high)))
+
+    @property
+    def actuator(self) -> Actuator:
+        """What the compiled steps take of the actuator."""
+        low, high = self.limits
+        return Actuator(float(low), float(high), float(self.quantum), *self.levels, float(self.slew))
 
 
 @dataclass(frozen=True)
@@ -152,83 +158,53 @@ def simulate_sampled(
         raise InputError(
             f"the run lasts {until_s:g} s; expected a finite time of one sample, {1 / drive.rate_hz:g} s, at least"
         )
-    model = design.loop_plant
-    plant = model if plant is None else plant
-    if plant.relative_degree < 1:
-        raise InputError("the true plant has as many zeros as poles; expected more poles, or the loop is algebraic")
-    T = 1 / drive.rate_hz
-    P = realize(plant_block(plant))
-    norm = float(np.abs(np.column_stack([P.A, P.b])).sum(axis=1).max())  # of one second
-    if samples * math.ceil(norm * T) > MOST_STEPS:
-        raise InputError(
-            f"the run needs {samples * math.ceil(norm * T):.3g} steps, set by its rate and the plant's fastest pole; "
-            f"expected at most {MOST_STEPS:.3g} (a shorter run)"
-        )
-    forward, feedback, theta = _controller(design, anti_windup, T, drive.method)
-    _require_one_solution(forward, feedback, theta, drive.rate_hz)
+    series = _series(design.loop_plant if plant is None else plant, drive, until_s)
+    controller = _controller(design, anti_windup, drive)
     time_s = instants(drive.rate_hz, until_s)
     r = reference(time_s)
-    whole, rest = split(min(drive.input_delay_s + plant.delay_s, until_s + 2 * T), T)  # beyond the run is beyond
-    low, high = drive.limits
-    y, u, command, start, reached = run(
-        forward.A,
-        forward.b,
-        forward.C[0],
-        forward.d[0],
-        feedback.A,
-        feedback.b,
-        feedback.C[0],
-        feedback.d[0],
-        theta.A,
-        theta.b,
-        theta.C,
-        theta.d,
-        feedback.whole[0],
-        feedback.now[0],
-        feedback.before[0],
-        P.A,
-        P.b,
-        P.C[0],
-        norm,
-        whole,
-        (1 - rest) * T,
-        T,
-        float(low),
-        float(high),
-        drive.quantum,
-        *drive.levels,
-        drive.slew,
-        r,
-    )
+    y, u, command, start, reached = run(*controller, series, drive.actuator, 1 / drive.rate_hz, r)
     if reached < len(r):
         raise DivergenceError(float(time_s[reached]))
     return SampledRun(time_s, r, y, r - y, u, _actuator(drive, command, start))
 
 
+def _series(plant: PlantModel, drive: Drive, until_s: float) -> Series:
+    """The plant as the run carries it, its dead time and the drive's in whole samples and a rest."""
+    if plant.relative_degree < 1:
+        raise InputError("the true plant has as many zeros as poles; expected more poles, or the loop is algebraic")
+    T = 1 / drive.rate_hz
+    P = realize(plant_block(plant))
+    norm = float(np.abs(np.column_stack([P.A, P.b])).sum(axis=1).max())  # of one second
+    steps = until_s * drive.rate_hz * math.ceil(norm * T)
+    if steps > MOST_STEPS:
+        raise InputError(
+            f"the run needs {steps:.3g} steps, set by its rate and the plant's fastest pole; expected at most "
+            f"{MOST_STEPS:.3g} (a shorter run)"
+        )
+    whole, rest = split(min(drive.input_delay_s + plant.delay_s, until_s + 2 * T), T)  # beyond the run is beyond
+    return Series(P.A, P.b, P.C[0], norm, whole, (1 - rest) * T)
+
+
 def _controller(
-    design: Design, anti_windup: AntiWindup | None, sample_time_s: float, method: str
+    design: Design, anti_windup: AntiWindup | None, drive: Drive
 ) -> tuple[SampledBlock, SampledBlock, SampledBlock]:
     """K/(1 + F) or K; T_so behind the model's dead time; theta1~, and theta2 behind that dead time."""
-    delay_s = design.loop_plant.delay_s
-    forward, feedback = design.controller_parts()
-    theta = (Block(0.0), Block(0.0))
+    delay_s, T = design.loop_plant.delay_s, 1 / drive.rate_hz
+    first, second = design.controller_parts()
+    compensator = (Block(0.0), Block(0.0))
     if anti_windup is not None:
-        theta = (anti_windup.theta1_tilde, anti_windup.theta2(design.loop_plant))
-    return (
-        sample_block(realize(forward), [0.0], sample_time_s, method),
-        sample_block(realize(feedback), [delay_s], sample_time_s, method),
-        sample_block(realize(*theta), [0.0, delay_s], sample_time_s, method),
-    )
-
-
-def _require_one_solution(forward: SampledBlock, feedback: SampledBlock, theta: SampledBlock, rate_hz: float) -> None:
+        compensator = (anti_windup.theta1_tilde, anti_windup.theta2(design.loop_plant))
+    forward = sample_block(realize(first), [0.0], T, drive.method)
+    feedback = sample_block(realize(second), [delay_s], T, drive.method)
+    theta = sample_block(realize(*compensator), [0.0, delay_s], T, drive.method)
     around = feedback.now[0] * feedback.d[0] if feedback.whole[0] == 0 else 0.0
     later = theta.now[1] * theta.d[1] if theta.whole[1] == 0 else 0.0
     if not (around < 1 and 1 + theta.d[0] + forward.d[0] * later / (1 - around) > 0):
         raise InputError(
-            f"at {rate_hz:g} Hz Tustin's rule leaves the controller an algebraic loop without one solution; expected a "
-            "higher rate, or the method exact"
+            f"at {drive.rate_hz:g} Hz Tustin's rule leaves the controller an algebraic loop without one solution; "
+            "expected a higher rate, or the method exact"
         )
+    return forward, feedback, theta
 
 
 def _actuator(drive: Drive, command: np.ndarray, start: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,16 +14,26 @@ FURTHEST = 4.0  # fastest root times step: the terms of a series grow to exp of 
 BRIEF = 0.01  # a dead time shorter than so much of the fastest root's time constant is no longer than a step
 
 
-@dataclass(frozen=True)
-class CompiledLoop:
+class CompiledLoop(NamedTuple):
     """What :func:`experiments.engine.integrator.integrate` takes of a loop, whatever its limits and its samples.
 
     Parameters
     ----------
-    unsaturated, saturated, tables, delays, brief, x0, step, groups
-        As there.
-    lags
-        Shape (g,): how much earlier each group is sampled, in seconds; zero first.
+    unsaturated
+        Over (x (n,), m, w (k,)): n rows [A + B C, 0, D + B E], the loop without saturation, a row [C 0 E], k rows
+        [Z 0 0], and o rows [. 0 0] of what is watched.
+    saturated
+        The same with n rows [A B D].
+    tables
+        Of the two, see :class:`experiments.engine.step_table.Tables`, for the signals u, Z x and what is watched.
+    delays, brief, x0
+        Shapes (k,), (k,), (n,); delays positive. Where ``brief``, the loop is that with a dead time of zero, and w_j
+        stands for what the dead time changes, Z_j x(t - h_j) - Z_j x(t).
+    step
+        The tables', in seconds, not more than any dead time that is not brief.
+    groups, lags
+        Shapes (g + 1,), (g,): groups[i] ... groups[i + 1] - 1 of what is watched is sampled lags[i] seconds earlier;
+        the first lag is zero.
     reading
         Shape (outputs, watched): makes the loop's outputs of what is watched.
     """

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from identification.base.arrays import Array
+
 MOST = 60  # degree
 JUMP = 1e-9  # a control that is further than this share beyond a limit has jumped there
 
@@ -122,7 +120,7 @@ def _root(g: Array, lo: float, hi: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def leave(
+def leaves_mode(
     U: Array, degree: int, mode: int, on_limit: int, stuck: bool, low: float, high: float, reach: float
 ) -> tuple[float, int, int]:
     """Where on (0, reach] a control leaves its mode, the mode that it enters, and the limit on which it is then.

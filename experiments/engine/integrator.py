@@ -9,20 +9,18 @@ rounding, the delayed signals w being earlier polynomials shifted. A whole step 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from experiments.engine.crossings import leave
-from experiments.engine.kinks import gap, insert, shift
-from experiments.engine.signals import change, expand, fill, unfold
-from experiments.engine.step_table import NEGLIGIBLE, NOTHING, Rows, Tables, advance, dot, times, whole_lanes
+from experiments.engine.compiled_loop import CompiledLoop
+from experiments.engine.crossings import leaves_mode
+from experiments.engine.kinks import BEYOND, Past, drop, images, shift
+from experiments.engine.signals import change, driven, expand, fill, unfold
+from experiments.engine.step_table import NEGLIGIBLE, NOTHING, advance, dot, times, whole_lanes
+from identification.base.arrays import Array
 
-Array = NDArray[Any]
-
-BEYOND = 0.5  # of a step: how far beyond its end, where no kink is, the polynomial of a cut step is read
 TRIALS = 30  # in which what brief dead times change settles,
 SETTLED = 4.0  # of what is negligible, when it moves by no more than that
 DIVERGENT = 1e100  # times the limits, or without limits of a state: beyond it a loop diverges
@@ -31,37 +29,36 @@ ENORMOUS = 1e250  # a state with which no run goes on, whatever the limits
 COMPLETE, DIVERGED, ENDLESS, CROWDED, EVENTFUL, UNSETTLED = 0, 1, 2, 3, 4, 5
 
 
+class Bounds(NamedTuple):
+    """Where to give up; ``room``, a power of two, is for the steps and mesh points that a dead time remembers."""
+
+    steps: int
+    events: int
+    room: int
+
+
 @njit(cache=True, nogil=True)
 def integrate(
-    unsaturated: Rows, saturated: Rows, tables: Tables, delays: Array, brief: Array, x0: Array,
-    reset_times: Array, resets: Array, low: float, high: float, horizon: float, step: float, samples: Array,
-    groups: Array, most_steps: int, most_events: int, room: int,
+    loop: CompiledLoop, reset_times: Array, resets: Array, low: float, high: float, samples: Array, horizon: float,
+    bounds: Bounds,
 ) -> tuple[Array, Array, Array, int, float, int, float]:  # fmt: skip
     """Integrate one loop from rest of its delayed signals, w_j(t < 0) = Z_j x0.
 
     Parameters
     ----------
-    unsaturated
-        Over (x (n,), m, w (k,)): n rows [A + B C, 0, D + B E], the loop without saturation, a row [C 0 E], k rows
-        [Z 0 0], and o rows [. 0 0] of what is watched.
-    saturated
-        The same with n rows [A B D].
-    tables
-        Of the two, see :class:`experiments.engine.step_table.Tables`, for the signals u, Z x and what is watched.
-    delays, brief, x0
-        Shapes (k,), (k,), (n,); delays positive. Where ``brief``, the loop is that with a dead time of zero, and w_j
-        stands for what the dead time changes, Z_j x(t - h_j) - Z_j x(t).
+    loop
+        Its equations as tables.
     reset_times, resets
         Shapes (b,), (b, g): times at which the first g states take given values.
     low, high
         Saturation limits, may be infinite.
-    horizon, step
-        End time and the tables' step in seconds, not more than any dead time that is not brief.
-    samples, groups
-        Shapes (g, s), (g + 1,): groups[i] ... groups[i + 1] - 1 of what is watched is sampled at the sorted times
-        samples[i] <= horizon; before zero it is as at zero. u is sampled with the first group.
-    most_steps, most_events, room
-        Where to give up; ``room``, a power of two, is for the steps and mesh points that a dead time remembers.
+    samples
+        Shape (g, s): each group of what is watched is sampled at the sorted times samples[i] <= horizon; before zero
+        it is as at zero. u is sampled with the first group.
+    horizon
+        End time in seconds.
+    bounds
+        Where to give up.
 
     Returns
     -------
@@ -71,7 +68,8 @@ def integrate(
         the time reached; the number of steps; the largest last term of a signal's polynomial, as a share of the
         largest that the signal was.
     """
-    n, k = len(x0), len(delays)
+    unsaturated, saturated, tables, delays, brief, x0, step, groups, _, _ = loop
+    n, k, room = len(x0), len(delays), bounds.room
     limit = max(abs(low) if np.isfinite(low) else 0.0, abs(high) if np.isfinite(high) else 0.0)
     most_u, most_x = (DIVERGENT * limit, ENORMOUS) if limit > 0 else (np.inf, DIVERGENT)
     increments, polynomials = tables.increments, tables.polynomials
@@ -79,7 +77,7 @@ def integrate(
     signals = len(indptr) - 1 - n
     most = polynomials.shape[1] // signals - 1
     values, sample = np.zeros((signals - k, samples.shape[1])), np.zeros(len(samples), np.int64)
-    events, modes, event_count = np.empty(most_events), np.empty(most_events, np.int64), 0
+    events, modes, event_count = np.empty(bounds.events), np.empty(bounds.events, np.int64), 0
 
     # the sources of the delayed signals, one polynomial a step, the step p at p % room, and where each dead time reads
     starts, lates, radii, degrees, pieces = np.empty(room), np.empty(room), np.empty(room), np.empty(room, np.int64), 0
@@ -96,6 +94,7 @@ def integrate(
     U, V = P[0], np.zeros((most + 1, n + 1 + k))
     V[0, :n] = x0
     rest = np.array([times(indptr, indices, data, n + 1 + j, V, 0) for j in range(k)])
+    remembered = Past(starts, lates, degrees, history, rest, queue)
     V[0, n + 1 :] = np.where(brief, 0.0, rest)
     x, scale, size = x0.copy(), np.abs(x0), np.zeros(1 + k)
     size[1:] = np.abs(rest)
@@ -112,7 +111,7 @@ def integrate(
     t, late, reset, status, steps, usual = 0.0, 0.0, 0, COMPLETE, 0, 0  # the time is t + late, lest it drifts
 
     while t < horizon:
-        if steps == most_steps:
+        if steps == bounds.steps:
             status = ENDLESS
             break
         steps += 1
@@ -190,7 +189,7 @@ def integrate(
         if reset < len(reset_times) and t_next == reset_times[reset]:
             whole = False  # it ends there to the last digit
         reach = 1.0 if whole else max((t_next - t - late) / step, 0.0)
-        exit_at, entered, crossed = leave(U, degree, mode, on_limit, standing > 2, low, high, reach)
+        exit_at, entered, crossed = leaves_mode(U, degree, mode, on_limit, standing > 2, low, high, reach)
         late_next = 0.0
         if exit_at >= 0 or whole:
             reach = exit_at if exit_at >= 0 else 1.0
@@ -206,17 +205,8 @@ def integrate(
             for j in range(k):
                 for i in range(degree + 1):
                     history[piece, j, i] = P[1 + j, i]
-            if kink:  # its images are mesh points, unless the two sides agree as far as they are read
-                left = (pieces - 1) & wrap
-                for j in range(k):
-                    W[0], before, moved = rest[j], 0, 0.0
-                    if pieces > 0:
-                        before, moved = degrees[left], (t - starts[left] + (late - lates[left])) / step
-                        for i in range(before + 1):
-                            W[i] = history[left, j, i]
-                    read = delays[j] / step if brief[j] else BEYOND
-                    if gap(W, before, moved, history[piece, j], degree, read, work) > negligible[1 + j]:
-                        queued = insert(queue, queued, t + delays[j], 1e-13 * (step + t))
+            if kink:
+                queued = images(remembered, pieces, queued, delays, brief, step, negligible, W, work)
                 kink = False
             pieces += 1
 
@@ -251,15 +241,9 @@ def integrate(
                 for j in range(k):
                     V[i, n + 1 + j] = z[n + 1 + k * i + j]
             V[0, : n + 1] = z[: n + 1]
-            driven = 0  # degree to which the delayed signals matter as far as that
-            for j in range(k):
-                top, power = filled[j], reach ** filled[j]
-                while top > driven and abs(z[n + 1 + k * top + j]) * power <= NEGLIGIBLE * size[1 + j]:
-                    top -= 1
-                    power /= reach
-                driven = max(driven, top)
+            matter = driven(z, n, filled, size, reach)
             rows = unsaturated if mode == 0 else saturated
-            advance(rows, tables.influence[which, signals:], V, n, driven, most, scale, step, reach, x)
+            advance(rows, tables.influence[which, signals:], V, n, matter, most, scale, step, reach, x)
             V[: known + 1, n + 1 :] = 0.0
         for r in range(n):
             scale[r] = max(scale[r], abs(x[r]))
@@ -276,7 +260,7 @@ def integrate(
 
         on_limit = crossed
         if exit_at >= 0:
-            if event_count == most_events:
+            if event_count == bounds.events:
                 status = EVENTFUL
                 break
             mode, kink = entered, True
@@ -285,13 +269,8 @@ def integrate(
         elif reset < len(reset_times) and t == reset_times[reset]:
             x[: resets.shape[1]] = resets[reset]
             reset, kink = reset + 1, True
-        passed = 0
-        while passed < queued and queue[passed] <= t + 1e-13 * (step + t):
-            passed, kink = passed + 1, True
-        if passed > 0:
-            queued -= passed
-            for q in range(queued):
-                queue[q] = queue[q + passed]
+        if queued > 0 and queue[0] <= t + 1e-13 * (step + t):
+            queued, kink = drop(queue, queued, t + 1e-13 * (step + t)), True
     tail = 0.0
     for s in range(1 + k):
         if size[s] > 0:

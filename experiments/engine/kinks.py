@@ -3,19 +3,39 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from experiments.engine.crossings import MOST
+from identification.base.arrays import Array
 
-Array = NDArray[Any]
-
+BEYOND = 0.5  # of a step: how far beyond its end, where no kink is, the polynomial of a cut step is read
 
 FACTORIAL = np.array([math.factorial(i) for i in range(MOST + 1)], dtype=float)
 INVERSE = 1 / FACTORIAL
+
+
+class Past(NamedTuple):
+    """The sources of the delayed signals, one polynomial a step, the step p at p % room; and the mesh to come.
+
+    Parameters
+    ----------
+    starts, lates, degrees, history
+        Shapes (room,), and (room, k, most + 1) of the coefficients: a step starts at ``starts`` + ``lates`` seconds.
+    rest
+        Shape (k,): the sources before zero.
+    queue
+        Shape (room,): the images of kinks in order.
+    """
+
+    starts: Array
+    lates: Array
+    degrees: Array
+    history: Array
+    rest: Array
+    queue: Array
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
@@ -51,7 +71,7 @@ def insert(queue: Array, queued: int, t: float, near: float) -> int:
 
 
 @njit(cache=True, nogil=True)
-def gap(
+def largest_difference(
     left: Array, left_degree: int, moved: float, right: Array, right_degree: int, radius: float, work: Array
 ) -> float:
     """The most that two polynomials differ within ``radius`` steps of where the right one starts.
@@ -67,3 +87,40 @@ def gap(
         most += abs(difference) * power
         power *= radius
     return most
+
+
+@njit(cache=True, nogil=True)
+def images(
+    past: Past, pieces: int, queued: int, delays: Array, brief: Array, step: float, negligible: Array, W: Array,
+    work: Array,
+) -> int:  # fmt: skip
+    """Queue the images of a kink at the start of the latest step, which is number ``pieces``; the queue's new length.
+
+    None is where the two sides of the kink agree to what is ``negligible`` (1 + k,), as far as they are read.
+    """
+    starts, lates, degrees, history, rest, queue = past
+    this, left = pieces & (len(starts) - 1), (pieces - 1) & (len(starts) - 1)
+    t = starts[this]
+    for j in range(len(delays)):
+        W[0], before, moved = rest[j], 0, 0.0
+        if pieces > 0:
+            before, moved = degrees[left], (t - starts[left] + (lates[this] - lates[left])) / step
+            for i in range(before + 1):
+                W[i] = history[left, j, i]
+        read = delays[j] / step if brief[j] else BEYOND
+        if largest_difference(W, before, moved, history[this, j], degrees[this], read, work) > negligible[1 + j]:
+            queued = insert(queue, queued, t + delays[j], 1e-13 * (step + t))
+    return queued
+
+
+@njit(cache=True, nogil=True)
+def drop(queue: Array, queued: int, until: float) -> int:
+    """Drop the times up to one from the sorted queue; its new length."""
+    passed = 0
+    while passed < queued and queue[passed] <= until:
+        passed += 1
+    if passed > 0:
+        queued -= passed
+        for q in range(queued):
+            queue[q] = queue[q + passed]
+    return queued

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from numba import njit
-from numpy.typing import NDArray
 
 from experiments.engine.kinks import shift
 from experiments.engine.step_table import NEGLIGIBLE, NOTHING, ROUNDING, Tables, dot, whole_lanes
-
-Array = NDArray[Any]
+from identification.base.arrays import Array
 
 
 @njit(cache=True, nogil=True)
@@ -39,6 +35,19 @@ def fill(z: Array, n: int, k: int, j: int, c: Array, degree: int, radius: float,
         power /= radius
     for i in range(degree + 1):
         z[n + 1 + k * i + j] = c[i]
+    return degree
+
+
+@njit(cache=True, nogil=True)
+def driven(z: Array, n: int, filled: Array, size: Array, reach: float) -> int:
+    """The degree to which the delayed signals in z, each ``filled`` (k,) to its own, matter within ``reach`` steps."""
+    degree, k = 0, len(filled)
+    for j in range(k):
+        top, power = filled[j], reach ** filled[j]
+        while top > degree and abs(z[n + 1 + k * top + j]) * power <= NEGLIGIBLE * size[1 + j]:
+            top -= 1
+            power /= reach
+        degree = max(degree, top)
     return degree
 
 

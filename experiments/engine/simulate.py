@@ -111,35 +111,16 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
     compiled = compile_loop(loop, idle_step=horizon)
     most_events, room, brief = 4096, _room(compiled), BRIEF
     while True:
-        if room * compiled.tables.increments.shape[2] > MOST_ROOM:
-            raise InputError(
-                f"the dead times reach from {compiled.delays.min():.3g} to {compiled.delays.max():.3g} s, too many "
-                "steps to remember; expected dead times that differ less, or zero"
-            )
-        step = compiled.step
-        if horizon / step > MOST_STEPS:
-            raise InputError(
-                f"the run needs {horizon / step:.3g} steps of {step:.3g} s, set by its shortest dead time or fastest "
-                f"pole; expected at most {MOST_STEPS:.3g} (a shorter run, a dead time of zero, or a slower design)"
-            )
+        _require_affordable(compiled, room, horizon)
         values, events, modes, status, end, _, tail = integrator.integrate(
-            compiled.unsaturated,
-            compiled.saturated,
-            compiled.tables,
-            compiled.delays,
-            compiled.brief,
-            compiled.x0,
+            compiled,
             loop.resets.times_s,
             loop.resets.values,
             float(low),
             float(high),
-            horizon,
-            step,
             time_s - compiled.lags[:, None],
-            compiled.groups,
-            int(MOST_STEPS),
-            most_events,
-            room,
+            horizon,
+            integrator.Bounds(int(MOST_STEPS), most_events, room),
         )
         if status == integrator.CROWDED:
             room *= 2
@@ -147,7 +128,7 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
             most_events *= 8
         elif status == integrator.UNSETTLED or (status == integrator.COMPLETE and tail > TAIL):
             brief = 0.0 if status == integrator.UNSETTLED else brief
-            compiled = compile_loop(loop, step / 2, brief)
+            compiled = compile_loop(loop, compiled.step / 2, brief)
             room = max(room, _room(compiled))
         else:
             break
@@ -164,6 +145,20 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
         events_s=events,
         modes=modes,
     )
+
+
+def _require_affordable(compiled: CompiledLoop, room: int, horizon: float) -> None:
+    if room * compiled.tables.increments.shape[2] > MOST_ROOM:
+        raise InputError(
+            f"the dead times reach from {compiled.delays.min():.3g} to {compiled.delays.max():.3g} s, too many "
+            "steps to remember; expected dead times that differ less, or zero"
+        )
+    if horizon / compiled.step > MOST_STEPS:
+        raise InputError(
+            f"the run needs {horizon / compiled.step:.3g} steps of {compiled.step:.3g} s, set by its shortest dead "
+            f"time or fastest pole; expected at most {MOST_STEPS:.3g} (a shorter run, a dead time of zero, or a slower "
+            "design)"
+        )
 
 
 def _room(compiled: CompiledLoop) -> int:

@@ -16,15 +16,13 @@ x_{p+m} = X_m x_p/C(p+m, m), and C(p+m, m) > p for m > 0, so that for a signal c
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from experiments.engine.crossings import BINOMIAL, MOST
-
-Array = NDArray[Any]
+from identification.base.arrays import Array
 
 ROUNDING = 1e-16
 NEGLIGIBLE = 1e-14  # a term, relative to the largest value of its signal so far

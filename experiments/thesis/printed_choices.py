@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 
-from data.thesis import model_named, printed
+from data.thesis import model_named, printed_numbers
 from design.chapter_2.design_delay_free import design_delay_free
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
@@ -21,9 +21,9 @@ def chapter_2(set_name: str = "implied") -> Design:
     set_name
         "implied" or "table".
     """
-    chosen = printed()["delay_free"]
+    chosen = printed_numbers()["delay_free"]
     model = model_named(set_name)
-    return design_delay_free(model.plant, model.additive_bound, chosen["reference"]["period_s"], chosen["epsilon"])
+    return design_delay_free(model, chosen["reference"]["period_s"], chosen["epsilon"])
 
 
 @cache
@@ -35,10 +35,10 @@ def chapter_4(set_name: str = "implied") -> Design:
     set_name
         "implied" or "table".
     """
-    chosen = printed()["extended"]
+    chosen = printed_numbers()["extended"]
     omega, pairs = chosen["reference"]["omega"], [(chosen["e"], chosen["f"])]
     model = model_named(set_name)
-    return design_extended(model.plant, model.additive_bound, [omega], chosen["a"], pairs)
+    return design_extended(model, [omega], chosen["a"], pairs)
 
 
 def thesis_reference(kind: str, omegas: Sequence[float]) -> Reference:
@@ -46,6 +46,6 @@ def thesis_reference(kind: str, omegas: Sequence[float]) -> Reference:
 
     Of several frequencies each has the thesis's amplitude and phase, which is our choice; omega = 0 is a constant.
     """
-    values = printed()[kind.replace("-", "_")]["reference"]
+    values = printed_numbers()[kind.replace("-", "_")]["reference"]
     n = len(omegas)
     return Reference((values["amplitude"],) * n, tuple(omegas), (values["phase_rad"],) * n, values["offset"])

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identification.base.arrays import Real
+from identification.base.arrays import Real, Whole
 from identification.base.errors import InputError
 from identification.bound.envelope import WIDTH, envelope_of
 from identification.bound.tightest_bound import Points, resonances, shares, tightest
@@ -31,7 +30,7 @@ class _Sample:
 
     omega: Real
     residual: Real
-    test: NDArray[np.intp]
+    test: Whole
 
 
 def bound_residuals(

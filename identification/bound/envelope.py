@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identification.base.arrays import Real
-
-Index = NDArray[np.intp]
+from identification.base.arrays import Real, Whole
 
 WIDTH = 0.1  # of the narrowest notch that is followed, in log frequency,
 PARTS = 30  # or, where less, the band over this,
@@ -70,7 +67,7 @@ def envelope_of(omega: Real, residual: Real) -> Envelope:
     return Envelope(frequencies[held], level[held])
 
 
-def _closed(x: Real, values: Real, count: Index) -> Real:
+def _closed(x: Real, values: Real, count: Whole) -> Real:
     """Smallest of the largest value of each window that holds a point; infinity where none does."""
     upto = np.cumsum(count)
     width = min(WIDTH, x[-1] / PARTS)
@@ -86,7 +83,7 @@ def _closed(x: Real, values: Real, count: Index) -> Real:
     return closed
 
 
-def _over(extreme: np.ufunc, values: Real, first: Index, last: Index) -> Real:
+def _over(extreme: np.ufunc, values: Real, first: Whole, last: Whole) -> Real:
     """np.maximum or np.minimum over values[first : last + 1] for arrays of ends, by doubling the length."""
     level = np.log2(last - first + 1).astype(int)
     found = np.empty(first.size)

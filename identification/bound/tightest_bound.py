@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 
-from identification.base.arrays import Real
+from identification.base.arrays import Real, Whole
 from identification.bound.least_excess import least_largest_excess
 from identification.bound.shape import OUTSIDE, Shape
 from identification.model.plant import AdditiveBound, PlantModel
@@ -43,7 +42,7 @@ class Points:
     residual: Real
     envelope: Real
 
-    def of(self, index: NDArray[np.intp]) -> Points:
+    def of(self, index: Whole) -> Points:
         """Some of the points."""
         return Points(self.omega[index], self.residual[index], self.envelope[index])
 
@@ -185,7 +184,7 @@ def resonances(*models: PlantModel | AdditiveBound) -> Real:
     )
 
 
-def _largest(omega: Real, values: Real, edges: Real) -> NDArray[np.intp]:
+def _largest(omega: Real, values: Real, edges: Real) -> Whole:
     """Where the largest value of each bin is; the bins that hold nothing are left out."""
     bins = np.linspace(edges[0], edges[1], BINS + 1)[1:-1]
     where = np.searchsorted(bins, np.log(omega), side="right")

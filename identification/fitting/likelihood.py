@@ -134,12 +134,12 @@ def maximise(
     *,
     soft: bool,
     tolerance: float,
-    enough: float = np.inf,
+    to_beat: float = np.inf,
 ) -> Likely:
     """Bounded least squares from ``theta`` with the errors' sigma (M,), then noise, aliases and parameters in turn.
 
     ``tolerance`` is the relative change of the cost at which a turn ends. A fit that is not on the way to a deviance
-    below ``enough`` is given up. The gain in ``theta`` is not used.
+    below ``to_beat`` is given up. The gain in ``theta`` is not used.
     """
     omega, response = lines.omega, lines.response
     theta, sign = _with_gain(omega, response, sigma, structure, theta)
@@ -159,7 +159,7 @@ def maximise(
             break
         gained = float(omega.size) if best is None else best.deviance - deviance
         best = Likely(structure, theta, sign, float(np.sqrt(a2)), float(np.sqrt(b2)), deviance)
-        if deviance - gained > enough:
+        if deviance - gained > to_beat:
             break
         sigma = np.sqrt((a2 + b2 * power) * lines.excitation)
     assert best is not None

@@ -109,18 +109,18 @@ class ScaledTest:
         held_s = test.record.sampling_s * self.centre if test.record is not None and test.record.held else None
         self.lines = Lines(self.omega, test.response / self.level, excitation, held_s)
 
-    def fit(self, structure: Structure, simpler: Likely | None, enough: float) -> Likely:
+    def fit(self, structure: Structure, simpler: Likely | None, to_beat: float) -> Likely:
         """The likeliest of several guesses, which may build on a fit with one zero mode and pole mode less.
 
-        Stops early when two guesses lead to the same optimum, or a few stay far above the deviance ``enough``.
+        Stops early when two guesses lead to the same optimum, or a few stay far above the deviance ``to_beat``.
         """
         best: Likely | None = None
         for tried, (theta, sigma) in enumerate(self._starts(structure, simpler), 1):
-            found = self._maximise(structure, theta, sigma, enough=enough)
+            found = self._maximise(structure, theta, sigma, to_beat=to_beat)
             agree = best is not None and abs(found.deviance - best.deviance) < SAME
             if best is None or found.deviance < best.deviance:
                 best = found
-            if agree or (tried >= GUESSES and best.deviance > enough + ALIKE * self.omega.size):
+            if agree or (tried >= GUESSES and best.deviance > to_beat + ALIKE * self.omega.size):
                 break
         assert best is not None
         return best
@@ -139,11 +139,11 @@ class ScaledTest:
                 if more:
                     yield more.pop(0)
 
-    def pursue(self, structure: Structure, starts: Iterable[Real], known: Likely, enough: float) -> Likely:
+    def pursue(self, structure: Structure, starts: Iterable[Real], known: Likely, to_beat: float) -> Likely:
         """The likeliest fit from the most promising of ``starts``, with the errors of a fit that is known already."""
         sigma = self._sigma(known)
         promising = self._ranked(structure, starts, self._response(known), sigma)[:PURSUED]
-        fits = [self._maximise(structure, theta, sigma, enough=enough) for theta in promising]
+        fits = [self._maximise(structure, theta, sigma, to_beat=to_beat) for theta in promising]
         return min(fits, key=lambda likely: likely.deviance)
 
     def _ranked(self, structure: Structure, starts: Iterable[Real], response: Complex, sigma: Real) -> list[Real]:
@@ -268,9 +268,14 @@ class ScaledTest:
         return _shift(structure, theta, -np.log(self.centre), -np.log(self.level), self.centre)
 
     def _maximise(
-        self, structure: Structure, theta: Real, sigma: Real, tolerance: float = COARSE, enough: float = np.inf
+        self,
+        structure: Structure,
+        theta: Real,
+        sigma: Real,
+        tolerance: float = COARSE,
+        to_beat: float = np.inf,
     ) -> Likely:
-        return maximise(self.lines, structure, theta, sigma, soft=self.soft, tolerance=tolerance, enough=enough)
+        return maximise(self.lines, structure, theta, sigma, soft=self.soft, tolerance=tolerance, to_beat=to_beat)
 
     def _response(self, likely: Likely) -> Complex:
         """What was measured, without the aliases of a fit."""

@@ -150,13 +150,13 @@ class Selection:
         The search for guesses ends early where they stay far behind a rival structure.
         """
         below = self.fits.get(Structure(structure.integrators, structure.zeros - 2, structure.poles - 2))
-        enough = [fit.deviance for fit in self.fits[rival]] if rival else [np.inf] * len(self.tests)
+        to_beat = [fit.deviance for fit in self.fits[rival]] if rival else [np.inf] * len(self.tests)
         fits: list[Likely] = []
         for i, test in enumerate(self.tests):
             leader = min(range(i), key=lambda k: fits[k].deviance / self.tests[k].omega.size, default=None)
             fit = test.follow(self.tests[leader], fits[leader]) if leader is not None else None
             if fit is None or leader is None or not test.as_well(fit, self.tests[leader], fits[leader]):
-                own = test.fit(structure, below[i] if below else None, enough[i])
+                own = test.fit(structure, below[i] if below else None, to_beat[i])
                 fit = own if fit is None or own.deviance < fit.deviance else fit
             fits.append(fit)
             self.tick()
@@ -181,8 +181,8 @@ class Selection:
         lost = 0.0
         for i, (test, known) in enumerate(zip(self.tests, self.fits[here], strict=True)):
             penalty = (there.size - here.size) * self._penalty(i)
-            enough = known.deviance - self.overdispersion * (penalty - HOPELESS)
-            found = test.pursue(there, reached_from(known, there, test.omega), known, enough)
+            to_beat = known.deviance - self.overdispersion * (penalty - HOPELESS)
+            found = test.pursue(there, reached_from(known, there, test.omega), known, to_beat)
             fits.append(found)
             lost += self._criterion_of(i, found) - self._criterion_of(i, known)
             self.tick()

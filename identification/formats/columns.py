@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
+from identification.base.arrays import Array, Flags, Whole
 from identification.base.errors import InputError
 
 POLAR = (("magnitude_db", "magnitude"), ("phase_deg", "phase_rad"))
@@ -58,8 +58,8 @@ class Table:
     """
 
     path: Path
-    columns: Mapping[str, NDArray[Any]]
-    numbers: NDArray[np.intp]
+    columns: Mapping[str, Array]
+    numbers: Whole
     in_lines: bool
     test: str | None = None
     synthetic: bool = False
@@ -75,7 +75,7 @@ class Table:
             raise InputError(f"{self.path}, {self.at(row, column)}{self._test}: {column} {found}; expected {expected}")
         self.refuse(f"{self.at(row, column)} {found}; expected {expected}")
 
-    def refuse_any(self, bad: NDArray[np.bool_], column: str, expected: str) -> None:
+    def refuse_any(self, bad: Flags, column: str, expected: str) -> None:
         """Raise InputError at the first row where ``bad`` holds, if there is one."""
         if bad.any():
             self.refuse_row(int(np.argmax(bad)), column, expected)

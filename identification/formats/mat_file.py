@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.io import loadmat, whosmat
 from scipy.io.matlab import MatReadWarning
 
+from identification.base.arrays import Array
 from identification.base.errors import InputError
 from identification.base.files import read_bytes
 from identification.formats.columns import COMPLEX, Table, choose_columns, quoted, split_tests
@@ -86,7 +86,7 @@ def _scipy(path: Path, read: Callable[[], Any]) -> Any:
         raise InputError(f"{path}: cannot be read ({reason}); expected a MAT file of version 4 to 7") from None
 
 
-def _numbers(path: Path, name: str, value: NDArray[Any]) -> NDArray[Any]:
+def _numbers(path: Path, name: str, value: Array) -> Array:
     """The variable as a vector or a matrix of real numbers, or complex ones where it is the response."""
     if np.iscomplexobj(value) != (name == COMPLEX):
         found, expected = ("complex", "real") if np.iscomplexobj(value) else ("real", "complex")
@@ -97,7 +97,7 @@ def _numbers(path: Path, name: str, value: NDArray[Any]) -> NDArray[Any]:
     return value.astype(complex if name == COMPLEX else float)
 
 
-def _labels(path: Path, value: NDArray[Any], count: int) -> list[str]:
+def _labels(path: Path, value: Array, count: int) -> list[str]:
     labels = []
     for k, item in enumerate(value.ravel(), 1):
         content = np.asarray(item).ravel()  # of a cell, or a number or text itself
@@ -110,5 +110,5 @@ def _labels(path: Path, value: NDArray[Any], count: int) -> list[str]:
     return labels
 
 
-def _size(value: NDArray[Any]) -> str:
+def _size(value: Array) -> str:
     return " x ".join(str(length) for length in (*value.shape, *([1] if value.ndim == 1 else [])))

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pyuff
-from numpy.typing import NDArray
 
+from identification.base.arrays import Array, Whole
 from identification.base.errors import InputError
 from identification.base.files import read_bytes
 from identification.formats.columns import INPUTS, Table, quoted
@@ -88,7 +88,7 @@ def _functions(path: Path) -> list[Function]:
 
 def _response(
     path: Path, response: Function, responses: Sequence[Function], coherences: Sequence[Function]
-) -> tuple[dict[str, NDArray[Any]], NDArray[np.intp]]:
+) -> tuple[dict[str, Array], Whole]:
     _check(path, response, "frequency", is_complex=True)
     kept = np.flatnonzero(response["x"] != 0)
     columns = {"frequency_hz": response["x"][kept], "response": response["data"][kept]}
@@ -107,7 +107,7 @@ def _response(
     return columns, kept + 1
 
 
-def _record(path: Path, one: Function, other: Function) -> tuple[dict[str, NDArray[Any]], NDArray[np.intp]]:
+def _record(path: Path, one: Function, other: Function) -> tuple[dict[str, Array], Whole]:
     for signal in (one, other):
         _check(path, signal, "time", is_complex=False)
         if signal["abscissa_spacing"] != 1:

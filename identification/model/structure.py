@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identification.base.arrays import Real
+from identification.base.arrays import Flags, Real, Whole
 from identification.model.plant import Mode, PlantModel
 
 
@@ -64,14 +63,14 @@ class Structure:
         zero_modes, pole_modes, real_zeros, real_poles = (theta[part] for part in self.parts)
         return zero_modes.reshape(-1, 2), pole_modes.reshape(-1, 2), real_zeros, real_poles
 
-    def frequencies(self) -> NDArray[np.bool_]:
+    def frequencies(self) -> Flags:
         """(zeros + poles + 2,) where theta is the logarithm of a frequency."""
         is_frequency = np.zeros(self.size, dtype=bool)
         for part, step in zip(self.parts, (2, 2, 1, 1), strict=True):
             is_frequency[part.start : part.stop : step] = True
         return is_frequency
 
-    def in_order(self, theta: Real) -> NDArray[np.intp]:
+    def in_order(self, theta: Real) -> Whole:
         """The order of theta's entries that sorts zero modes and pole modes by omega."""
         order = np.arange(theta.size)
         for part in self.parts[:2]:

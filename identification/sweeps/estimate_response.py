@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identification.base.arrays import Complex, Real
+from identification.base.arrays import Complex, Flags, Real, Whole
 from identification.base.errors import InputError
 from identification.model.pulse_response import hold
 from identification.sweeps.excited_lines import excited_band, whole_periods
@@ -22,8 +21,6 @@ from identification.sweeps.local_models import (
     pooled,
     unexplained,
 )
-
-Indices = NDArray[np.intp]
 
 SHORTEST_WINDOW = COEFFICIENTS + 3  # three degrees of freedom left for the variance
 WINDOWS = 600  # aimed at; a longer record makes longer windows
@@ -177,9 +174,7 @@ def _less_drift(
     return [replace(group, output=group.output - drift @ size) for group, drift in zip(groups, drifts, strict=True)]
 
 
-def _needs_transient(
-    truncated: LocalFit, rest: LocalFit, groups: Sequence[Windows], *, noisy_input: bool
-) -> NDArray[np.bool_]:
+def _needs_transient(truncated: LocalFit, rest: LocalFit, groups: Sequence[Windows], *, noisy_input: bool) -> Flags:
     """In which windows the transient explains more than noise does: F ratio of neighbouring windows together.
 
     What is left must also be a material part of the output's power: a local model is never quite the response.
@@ -200,7 +195,7 @@ def _needs_transient(
     return needs
 
 
-def _pooled_ratio(truncated: LocalFit, rest: LocalFit, power: Real, windows: Indices) -> Real:
+def _pooled_ratio(truncated: LocalFit, rest: LocalFit, power: Real, windows: Whole) -> Real:
     """F ratio of ``windows`` (K,), each with its neighbours among them; 0 where nothing material is left."""
     left_with, left_without, free_with, free_without, total = (
         np.convolve(x[windows], np.ones(min(TOGETHER, windows.size)), mode="same")
@@ -225,7 +220,7 @@ def _places(width: int) -> tuple[Real, Real]:
     return np.arange(-half, half + 1) / half, np.array([-node, 0.0, node])
 
 
-def _tiles(band: Indices) -> list[Indices]:
+def _tiles(band: Whole) -> list[Whole]:
     """The band's lines in windows of odd width, (C, W) for each width, narrower where frequencies are low."""
     widest = max(SHORTEST_WINDOW, band.size // WINDOWS) // 2 * 2 + 1
     tiles, first = [], 0

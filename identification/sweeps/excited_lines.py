@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identification.base.arrays import Real
-
-Indices = NDArray[np.intp]
+from identification.base.arrays import Real, Whole
 
 EXCITED = 0.03  # of the typical power of the excited lines (-15 dB)
 PERIODIC = 0.95  # correlation with itself, periods later, of an input that is repeated
@@ -49,7 +46,7 @@ def whole_periods(u: Real, y: Real, *, shortest: int) -> tuple[Real, Real, int]:
     return u[-kept:], y[-kept:], periods
 
 
-def excited_band(power: Real, *, smoothing: int) -> Indices:
+def excited_band(power: Real, *, smoothing: int) -> Whole:
     """Find the run of neighbouring lines that holds most of the input's energy.
 
     Parameters
@@ -61,7 +58,7 @@ def excited_band(power: Real, *, smoothing: int) -> Indices:
 
     Returns
     -------
-    Indices
+    Whole
         The run's indices into ``power``, increasing by one.
 
     Notes
@@ -73,7 +70,7 @@ def excited_band(power: Real, *, smoothing: int) -> Indices:
     return max(runs, key=lambda run: run[-1] / max(run[0], smoothing))
 
 
-def _run(power: Real, weighted: Real, smoothing: int) -> Indices:
+def _run(power: Real, weighted: Real, smoothing: int) -> Whole:
     # A noisy input has single weak lines, so the run is found on a wide mean; its ends are then cut on a narrow one.
     wide, narrow = (np.convolve(weighted, np.full(width, 1 / width), mode="same") for width in (smoothing, 3))
     threshold = EXCITED * np.sum(wide**2) / np.sum(wide)

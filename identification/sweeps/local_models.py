@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identification.base.arrays import Complex, Real
-
-Flags = NDArray[np.bool_]
+from identification.base.arrays import Array, Complex, Flags, Real
 
 ORDER = 2  # of the polynomials
 COEFFICIENTS = 2 * (ORDER + 1)  # of the response and of the transient
@@ -192,5 +188,5 @@ def _fit(windows: Windows, tail: int, poles: int) -> LocalFit:
     return best
 
 
-def _apart_from_zero(values: NDArray[Any]) -> Complex:
+def _apart_from_zero(values: Array) -> Complex:
     return np.asarray(np.where(np.abs(values) < NEAREST, NEAREST, values), dtype=complex)

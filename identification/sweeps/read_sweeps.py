@@ -14,6 +14,7 @@ from identification.formats.csv_file import read_csv
 from identification.formats.mat_file import read_mat
 from identification.formats.uff_file import read_uff
 from identification.sweeps.estimate_response import estimate_response
+from identification.sweeps.kept_responses import read_responses
 from identification.sweeps.response import FEWEST_LINES, FrequencyResponse, Record
 from identification.sweeps.swapped_or_wrong_unit import bends, lead_time, wrap
 
@@ -21,6 +22,7 @@ FEWEST_SAMPLES = 128
 JITTER = 0.05  # largest distance of a sample from the uniform grid, in sampling intervals
 CONSTANT = 1e-9  # of a signal's size
 LARGEST = 1e50  # number in a column
+KEPT = ".npz"
 READERS = {".csv": read_csv, ".mat": read_mat, ".uff": read_uff, ".unv": read_uff, ".58": read_uff}
 
 
@@ -49,7 +51,9 @@ def input_files(paths: Sequence[Path | str]) -> list[Path]:
 def read_sweeps(paths: Sequence[Path | str]) -> list[FrequencyResponse]:
     """Read the tests of files and folders (see :func:`input_files`), in their order.
 
-    A file holds frequency responses or raw records: a MAT file if its name ends in .mat, a universal file if it ends
+    A file that ends in .npz holds responses that were estimated before, see
+    :mod:`identification.sweeps.kept_responses`; they keep their names and the paths that they came from. Every other
+    file holds frequency responses or raw records: a MAT file if its name ends in .mat, a universal file if it ends
     in .uff, .unv or .58, and else a CSV. Its columns, in a MAT file its variables, say what they are by their names:
     frequency_hz or omega (rad/s); magnitude_db or magnitude, with phase_deg or phase_rad; or real, imag; and
     coherence if there is one. A raw record has time_s, output, and input (band-limited like the output before both are
@@ -65,6 +69,9 @@ def read_sweeps(paths: Sequence[Path | str]) -> list[FrequencyResponse]:
     files = input_files(paths)
     tests = []
     for file, name in zip(files, _names(files), strict=True):
+        if file.suffix.lower() == KEPT:
+            tests += read_responses(file)
+            continue
         for table in READERS.get(file.suffix.lower(), read_csv)(file):
             label = name if table.test is None else f"{name}, test {table.test}"
             tests.append(_from_record(table, label) if "time_s" in table.columns else _from_response(table, label))

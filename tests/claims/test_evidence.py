@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from data.thesis import model_named, printed
+from data.thesis import model_named, printed_numbers
 from design.anti_windup.compensator import second_order
 from design.anti_windup.thesis_compensator import beta_grid, optimal_gamma
 from design.blocks.block import plant_block, plant_numerator
@@ -30,8 +30,8 @@ from identification.model.model_file import IdentifiedModel
 
 @pytest.fixture(scope="module")
 def delay_free_design(implied: IdentifiedModel) -> Design:
-    chosen = printed()["delay_free"]
-    return design_delay_free(implied.plant, implied.additive_bound, chosen["reference"]["period_s"], chosen["epsilon"])
+    chosen = printed_numbers()["delay_free"]
+    return design_delay_free(implied, chosen["reference"]["period_s"], chosen["epsilon"])
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_omega_d1_of_table_2_1_does_not_give_7_952e4():
 
 
 def test_lambda_has_no_term_in_s(implied: IdentifiedModel):
-    chosen = printed()["delay_free"]
+    chosen = printed_numbers()["delay_free"]
     units = internal_model(implied.plant, 2 * np.pi / chosen["reference"]["period_s"], chosen["epsilon"])
     assert all(root.real == 0 for root in units.one_plus_F.zeros)
 
@@ -140,7 +140,7 @@ def test_gamma_97_puts_the_zeros_of_one_plus_theta1_on_the_peak_of_W_a(implied: 
 
 
 def test_printed_theta2_has_the_plants_pole_at_zero(implied: IdentifiedModel):
-    chosen = printed()["delay_free"]
+    chosen = printed_numbers()["delay_free"]
     theta2 = second_order(chosen["alpha"], chosen["beta"], chosen["gamma"]).theta2(implied.plant)
     assert 0j in theta2.poles
     assert not theta2.is_stable
@@ -151,11 +151,11 @@ def test_printed_theta2_has_the_plants_pole_at_zero(implied: IdentifiedModel):
 
 @pytest.mark.parametrize("kind", ["delay-free", "extended"])
 def test_following_the_reference_needs_more_than_10(kind: str, implied: IdentifiedModel):
-    values = printed()[kind.replace("-", "_")]["reference"]
+    values = printed_numbers()[kind.replace("-", "_")]["reference"]
     omega = values.get("omega", 2 * np.pi / values.get("period_s", np.inf))
     needed = values["amplitude"] * omega / implied.plant.gain
     assert needed == pytest.approx({"delay-free": 11.05, "extended": 10.56}[kind], abs=0.005)
-    assert needed > printed()["delay_free"]["limit"]
+    assert needed > printed_numbers()["delay_free"]["limit"]
     exact = values["amplitude"] / abs(complex(implied.plant(1j * omega)))
     assert exact == pytest.approx(needed, rel=1e-4)
 
@@ -205,7 +205,7 @@ def test_swapped_pid_gains_overshoot_without_anti_windup_and_hardly_with_it(pid_
 
 @pytest.fixture(scope="module")
 def reference() -> Reference:
-    return thesis_reference("extended", [printed()["extended"]["reference"]["omega"]])
+    return thesis_reference("extended", [printed_numbers()["extended"]["reference"]["omega"]])
 
 
 @pytest.fixture(scope="module")

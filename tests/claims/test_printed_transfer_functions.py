@@ -7,7 +7,7 @@ import printed_functions as printed_text
 import pytest
 from printed_functions import FAST_PAIR, PrintedFunction
 
-from data.thesis import model_named, printed
+from data.thesis import model_named, printed_numbers
 from design.anti_windup.compensator import second_order
 from design.blocks.block import Block
 from design.chapter_2.internal_model import internal_model
@@ -23,7 +23,7 @@ ROUNDING = 1e-9  # 30625 lies exactly at the end of what 3.062e4 allows
 
 def delay_free_blocks(plant: PlantModel) -> dict[str, Block]:
     """G_A, theta1 and theta2 of section 2.4."""
-    chosen = printed()["delay_free"]
+    chosen = printed_numbers()["delay_free"]
     units = internal_model(plant, 2 * np.pi / chosen["reference"]["period_s"], chosen["epsilon"])
     kind = second_order(chosen["alpha"], chosen["beta"], chosen["gamma"])
     return {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from data.thesis import printed
+from data.thesis import printed_numbers
 from design.chapters_3_4.interpolate_Q import Conditions, by_poles, by_zeros, conditions, lagrange
 from identification.base.errors import InputError
 
@@ -38,7 +38,7 @@ def test_lagrange_is_the_zeros_design_with_e_2_and_f_1(omega: float, a: float):
 
 def test_table_4_1_chose_the_lagrange_design():
     """The thesis says that it uses "designing the zeros" and not Lagrange; with e = 2, f = 1 they are the same Q."""
-    chosen = printed()["extended"]
+    chosen = printed_numbers()["extended"]
     wanted = conditions([chosen["reference"]["omega"]], DELAY_S, chosen["a"])
     assert thesis_lagrange(wanted).real == pytest.approx([6.2496, 6.89, 4.1296], abs=5e-5)
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from scipy.integrate import quad
 
-from data.thesis import THESIS, model_named, printed
+from data.thesis import THESIS, model_named, printed_numbers
 from design.blocks.block import Block, plant_block, plant_denominator
 from design.chapters_3_4.design_extended import design_extended
 from design.chapters_3_4.interpolate_Q import by_zeros, conditions
@@ -44,7 +44,7 @@ def pid_runs() -> pd.DataFrame:
 
 def test_the_wound_up_control_settles_inside_the_range(pid_runs: pd.DataFrame):
     """In a steady state u = y/gain; |y| <= gain limit, so that |u| <= limit whatever the step that y can reach."""
-    values = printed()["pid"]
+    values = printed_numbers()["pid"]
     time_s = pid_runs["time_s"].to_numpy()
     middle, half = over_last(time_s, pid_runs["control_swapped_none"].to_numpy(), 5.0)
     assert middle == pytest.approx(STEP / values["gain"], rel=0.05)
@@ -55,7 +55,7 @@ def test_the_wound_up_control_settles_inside_the_range(pid_runs: pd.DataFrame):
 
 def test_the_printed_pid_gains_do_not_stabilise_and_the_swapped_ones_do():
     """By the exact characteristic roots, and by the argument principle."""
-    values = printed()["pid"]
+    values = printed_numbers()["pid"]
     lag = 1 / values["time_constant_s"]
     plant = Block(values["gain"] * lag, (), (complex(-lag),), values["delay_s"])
     gains = values["printed_proportional"], values["printed_integral"]
@@ -68,7 +68,7 @@ def test_the_printed_pid_gains_do_not_stabilise_and_the_swapped_ones_do():
 @pytest.mark.parametrize(("gain", "met_s"), [(1.0, 35.2), (10.0, 22.4), (100.0, 0.06)])
 def test_when_u_and_sat_u_coincide_is_a_matter_of_the_back_calculation_gain(gain: float, met_s: float):
     """To 1 % of the limit, for a step of 10; with a gain of 1 they are equal from 37 s on."""
-    values = printed()["pid"]
+    values = printed_numbers()["pid"]
     plant = {name: values[name] for name in ("gain", "time_constant_s", "delay_s", "limit")}
     swapped = {"proportional": values["printed_integral"], "integral": values["printed_proportional"]}
     time_s, limit = np.linspace(0.0, 60.0, 30001), values["limit"]
@@ -146,7 +146,7 @@ def test_the_dead_zone_is_zero_between_the_limits(limit: float):
 
 def test_s2_plus_epsilon_holds_the_offset_that_R_leaves_out(delay_free_design: Design):
     """The error to a constant of 50 is 50/(1 + K(0) B(0)/(epsilon omega_1^2)), not 0."""
-    chosen = printed()["delay_free"]["reference"]
+    chosen = printed_numbers()["delay_free"]["reference"]
     G_A, K = (complex(delay_free_design.blocks[name](0)) for name in ("G_A", "K"))
     left = abs(chosen["offset"] / (1 + G_A * K))
     assert 1e-7 < left < 2e-6
@@ -164,7 +164,7 @@ def test_the_shipped_sweeps_say_that_they_are_synthetic():
 
 def test_without_anti_windup_the_weights_decide():
     """With ours u grows for all of 50 periods though K is stable; with a W_1 that asks for less the loop settles."""
-    limit = printed()["delay_free"]["limit"]
+    limit = printed_numbers()["delay_free"]["limit"]
     ours, others = (long_run(weights, None) for weights in ("ours", "others"))
     assert DESIGNS["ours"]().blocks["K"].is_stable
     assert np.max(np.abs(ours.outputs["error"])) == pytest.approx(177, abs=1)
@@ -189,7 +189,7 @@ def test_both_choices_of_weights_are_what_remark_1_asks_for(weights: str):
 
 @pytest.mark.parametrize("weights", DESIGNS)
 def test_the_controller_output_exceeds_the_limits_by_little(weights: str):
-    control, limit = np.abs(long_run(weights, "thesis").control), printed()["delay_free"]["limit"]
+    control, limit = np.abs(long_run(weights, "thesis").control), printed_numbers()["delay_free"]["limit"]
     assert 0.2 < np.mean(control > limit) < 0.5
     assert limit < control.max() < 1.005 * limit
 
@@ -201,7 +201,7 @@ def test_the_controller_output_exceeds_the_limits_by_little(weights: str):
 def test_the_printed_bound_guarantees_nothing(name: str, peak: float, at: float | None):
     """For the set behind the printed transfer functions; for Table 2.1 as printed it does, with zeta_n1 = 0.08."""
     model = model_named(name)
-    design = design_extended(model.plant, model.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
+    design = design_extended(model, [1.5], 4.0, [(2.0, 1.0)])
     found = margins_of(delay_loop(design, design.loop_plant), model.additive_bound).W_a_C_S
     assert found.value == pytest.approx(peak, abs=0.005)
     assert at is None or found.omega == pytest.approx(at, rel=1e-3)
@@ -296,7 +296,7 @@ def test_3_21_is_a_choice(extended_design: Design):
 
 def test_a_first_order_Q_meets_the_conditions_at_high_frequencies():
     """(b s + c)/(s + f) with c = f Q(0): three real conditions, three coefficients."""
-    delay_s, a = printed()["plants"]["implied"]["delay_s"], printed()["extended"]["a"]
+    delay_s, a = printed_numbers()["plants"]["implied"]["delay_s"], printed_numbers()["extended"]["a"]
     stable = {}
     for omega in (1.5, 198.0, 200.0, 2 / delay_s, 392.0, 394.0):
         wanted = conditions([omega], delay_s, a)
@@ -311,7 +311,7 @@ def test_a_first_order_Q_meets_the_conditions_at_high_frequencies():
 
 
 def test_the_printed_Q_at_omega_misses_the_condition():
-    chosen, delay_s = printed()["extended"], printed()["plants"]["implied"]["delay_s"]
+    chosen, delay_s = printed_numbers()["extended"], printed_numbers()["plants"]["implied"]["delay_s"]
     wanted = conditions([1.5], delay_s, chosen["a"])
     b, c, d = by_zeros(wanted, [(chosen["e"], chosen["f"])]).numerator
     s = 1j * wanted.omegas[0]
@@ -351,8 +351,8 @@ def test_a_plant_of_another_kind_turns_its_statements(inputs: Inputs):
 
 def test_other_printed_numbers_turn_their_statements(inputs: Inputs, monkeypatch: pytest.MonkeyPatch):
     """gamma = -1 makes theta2 stable; with T_d ten times as long the Pade coefficients are still 2 and 12."""
-    forgetting = {**printed(), "delay_free": printed()["delay_free"] | {"gamma": -1.0}}
-    monkeypatch.setattr("experiments.thesis.claims.checks.statements.printed", lambda: forgetting)
+    forgetting = {**printed_numbers(), "delay_free": printed_numbers()["delay_free"] | {"gamma": -1.0}}
+    monkeypatch.setattr("experiments.thesis.claims.checks.statements.printed_numbers", lambda: forgetting)
     assert popov(inputs)["statement.theta2_stable"] == 1
     longer = pade({**inputs, "implied.delay_s": 0.081})
     assert (longer["pade.s"], longer["pade.s2"]) == (pytest.approx(2), pytest.approx(12))
@@ -360,7 +360,7 @@ def test_other_printed_numbers_turn_their_statements(inputs: Inputs, monkeypatch
 
 def test_another_design_turns_its_statements(inputs: Inputs, implied: IdentifiedModel, monkeypatch: pytest.MonkeyPatch):
     """A robust redesign keeps what is stable and equal, and is robust."""
-    redesigned = design_extended(implied.plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9)
+    redesigned = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9)
     before = smith_predictor(inputs)
     monkeypatch.setattr("experiments.thesis.claims.checks.statements.chapter_4", lambda: redesigned)
     after = smith_predictor(inputs)

@@ -1,15 +1,18 @@
-"""Every test that a page of docs/ names exists, and the errata explain every claim that does not agree."""
+"""What pages and docstrings name exists, and the errata explain every claim that does not agree."""
 
 from __future__ import annotations
 
 import re
+from importlib import import_module
 from pathlib import Path
 
+import click
 import pytest
 
 from experiments.thesis.claims.ledger import read_ledger
 
 ROOT = Path(__file__).resolve().parents[2]
+ROOMS = ("identification", "design", "experiments", "paper_figures")
 
 
 @pytest.mark.parametrize(
@@ -45,3 +48,54 @@ def test_the_errata_explain_every_claim_that_does_not_agree() -> None:
         explained += names
     wanted = ledger.index[ledger["status"].isin(["differs", "not_reproducible"])]
     assert sorted(explained) == sorted(wanted)
+
+
+def resolves(name: str, module: str) -> bool:
+    """Whether a name of a docstring is there: as it stands, in its module, or in a class of its module."""
+    own = import_module(module)
+    for start in ("", f"{module}."):
+        parts = (start + name).split(".")
+        for k in range(len(parts), 0, -1):
+            try:
+                found: object = import_module(".".join(parts[:k]))
+            except ImportError:
+                continue
+            if all((found := getattr(found, part, None)) is not None for part in parts[k:]):
+                return True
+            break
+    classes = [each for each in vars(own).values() if isinstance(each, type)]
+    fields = {field for each in classes for field in (*vars(each), *getattr(each, "__annotations__", ()))}
+    return name in fields or name.rpartition(".")[2] in fields
+
+
+def test_every_reference_in_a_docstring_resolves() -> None:
+    """Modules move; what names them must follow."""
+    found, lost = 0, []
+    for room in (*ROOMS, "data/thesis"):
+        for path in sorted((ROOT / room).rglob("*.py")):
+            module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+            for name in re.findall(
+                r":(?:func|class|mod|meth|data|attr):`~?([\w.]+)`", path.read_text(encoding="utf-8")
+            ):
+                found += 1
+                lost += [] if resolves(name, module) else [f"{module}: {name}"]
+    assert found > 250
+    assert lost == []
+
+
+PAGES = [ROOT / "README.md", ROOT / "data" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_and_commands_of_a_page_exist(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    for link in re.findall(r"\]\((?!http|#)([^)#]+)", text):
+        assert (page.parent / link).exists(), link
+    for file in re.findall(rf"`((?:{'|'.join((*ROOMS, 'tests', 'benchmarks', 'tools'))})/[\w/]+\.py)", text):
+        assert (ROOT / file).is_file(), file
+    for command in re.findall(rf"-m ((?:{'|'.join(ROOMS)}) [\w -]+)", text):
+        room, *words = command.split()
+        found = import_module(f"{room}.__main__").main
+        while isinstance(found, click.Group) and words:
+            assert words[0] in found.commands, f"{room} {words[0]}"
+            found = found.commands[words.pop(0)]

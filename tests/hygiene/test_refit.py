@@ -37,7 +37,8 @@ fi
 if [ -e "$here/$command.crashes" ]; then echo "Traceback of $command" >&2; exit 1; fi
 echo "$said" >> "$here/log"
 case $room in
-identification | design) touch "$output" ;;
+identification) touch "${output%/*}/model.json" "$output" ;;
+design) touch "$output" ;;
 experiments)
     [ $command != campaign ] || { touch "$output"; exit; }
     name=${command//-/_}
@@ -94,7 +95,7 @@ def test_all_is_made_and_then_nothing_is_left_to_do(make: Make, tmp_path: Path) 
     assert {f"figures/fig_{n}.pdf" for n in ("2_09", "2_10", "2_14", "4_01", "4_04")} <= names
     assert not any("refused" in name for name in names)
     assert f"identification fit {tmp_path}/a.csv --modes 1 --output" in log(tmp_path)
-    assert f"summary {tmp_path}/mine/model.json {tmp_path}/a.csv --build {tmp_path}/mine" in log(tmp_path)
+    assert f"summary {tmp_path}/mine/model.json {tmp_path}/mine/responses.npz --build {tmp_path}/mine" in log(tmp_path)
     before = log(tmp_path)
     assert make("refit", "FIT=--modes 1").returncode == 0
     assert log(tmp_path) == before

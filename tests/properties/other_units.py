@@ -142,12 +142,12 @@ class Units:
 
 def small_extended(model: IdentifiedModel, time: float) -> Design:
     """Chapters 3 and 4 for the small plant, in a unit of time."""
-    return design_extended(model.plant, model.additive_bound, [0.5 / time], 1.0 / time, [(1.0 / time, 0.3 / time**2)])
+    return design_extended(model, [0.5 / time], 1.0 / time, [(1.0 / time, 0.3 / time**2)])
 
 
 def small_delay_free(model: IdentifiedModel, time: float) -> Design:
     """Chapter 2 for the small plant, in a unit of time."""
-    return design_delay_free(model.plant, model.additive_bound, 12.0 * time, 1e-3 / time**2)
+    return design_delay_free(model, 12.0 * time, 1e-3 / time**2)
 
 
 def same(found: np.ndarray, expected: np.ndarray, share: float) -> None:

@@ -141,7 +141,7 @@ def test_every_frequency_of_the_reference_is_followed(
 ) -> None:
     """One interpolation condition each: from rest and with saturation on the way the error dies out."""
     pairs = [(2.0, 1.0)] * sum(omega > 0 for omega in omegas)
-    design = design_extended(implied.plant, implied.additive_bound, omegas, 4.0, pairs, robust_level=level)
+    design = design_extended(implied, omegas, 4.0, pairs, robust_level=level)
     n = len(omegas)
     reference = Reference((20.0,) * n, tuple(omegas), (1.0,) * n, 0.0)
     loop = design_loop(design, reference, design.compensator("corrected"))

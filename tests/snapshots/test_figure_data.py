@@ -111,8 +111,7 @@ def tables(extended_design: Design, stored_design: Design, campaign: Path) -> di
     implied = model_named("implied")
     chosen = extended_design.free
     robust = design_extended(
-        implied.plant,
-        implied.additive_bound,
+        implied,
         extended_design.reference_omegas,
         chosen.a,
         chosen.pairs,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -52,7 +54,7 @@ def test_fig_2_6_is_the_coprime_factor_scheme(extended_design: Design) -> None:
 def test_the_output_keeps_what_the_final_value_says(
     implied: IdentifiedModel, plant: PlantModel, limit: float, gamma: float
 ) -> None:
-    design = design_extended(plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
+    design = design_extended(dataclasses.replace(implied, plant=plant), [1.5], 4.0, [(2.0, 1.0)])
     kind = second_order(0.05, 0.025, gamma)
     time_s = np.linspace(0.0, 40.0, 400001)
     run = simulate(design_loop(design, sinusoid(50.0, 1.5, 0.5, 0.0), kind), (-limit, limit), time_s)

@@ -28,7 +28,7 @@ def other(implied: IdentifiedModel) -> IdentifiedModel:
 
 @pytest.fixture(scope="module")
 def other_design(other: IdentifiedModel) -> Design:
-    return design_extended(other.plant, other.additive_bound, [0.5], 1.5, [(1.0, 0.25)])
+    return design_extended(other, [0.5], 1.5, [(1.0, 0.25)])
 
 
 def test_trade_off_of_another_plant(
@@ -92,7 +92,7 @@ def test_a_delay_free_design_has_no_q(delay_free_design: Design) -> None:
 
 
 def test_robustness_of_another_plant(other: IdentifiedModel, other_design: Design) -> None:
-    robust = design_extended(other.plant, other.additive_bound, [0.5], 1.5, [(1.0, 0.25)], robust_level=0.4)
+    robust = design_extended(other, [0.5], 1.5, [(1.0, 0.25)], robust_level=0.4)
     tables = robustness_tables({"design_extended": other_design, "design_robust": robust})
     table, summary = tables["robustness"], tables["robustness_summary"].set_index("run")
     assert summary.loc["design_robust", "peak"] == pytest.approx(0.4, rel=0.05)

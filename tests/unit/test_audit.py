@@ -55,7 +55,7 @@ def test_the_thesis_design(extended_design: Design) -> None:
 
 
 def test_the_redesign_is_guaranteed(implied: IdentifiedModel) -> None:
-    found = audit(design_extended(implied.plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9))
+    found = audit(design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9))
     assert not isinstance(found.margins, str)
     assert found.margins.is_guaranteed
     assert 0 < found.robust_sector["corrected"] < 0.95
@@ -89,7 +89,7 @@ def test_what_the_stabiliser_reaches_is_not_taken_from_the_file(delay_free_desig
 
 def test_a_dead_time_that_the_design_ignored_may_be_fatal(implied: IdentifiedModel) -> None:
     plant = dataclasses.replace(implied.plant, delay_s=0.2)
-    found = audit(design_delay_free(plant, implied.additive_bound, 4.0, 1e-4))
+    found = audit(design_delay_free(dataclasses.replace(implied, plant=plant), 4.0, 1e-4))
     assert isinstance(found.with_delay, str)
     assert "roots in the right half plane" in found.with_delay
 
@@ -105,7 +105,9 @@ def test_a_dead_time_that_the_design_ignored_may_be_fatal(implied: IdentifiedMod
 )
 def test_other_plants(implied: IdentifiedModel, plant: PlantModel, omegas: list[float]) -> None:
     bound = AdditiveBound.printed_form(0.0015 * abs(plant.gain), 20.0, 60.0, 0.05)
-    found = audit(design_extended(plant, bound, omegas, 4.0, [(2.0, 1.0)] * sum(omega > 0 for omega in omegas)))
+    found = audit(
+        design_extended(IdentifiedModel(plant, bound), omegas, 4.0, [(2.0, 1.0)] * sum(omega > 0 for omega in omegas))
+    )
     assert not isinstance(found.margins, str)
     assert found.same_controller is not None
     assert found.same_controller < 1e-6
@@ -181,7 +183,7 @@ def test_the_robust_sector_sees_a_narrow_resonance_of_the_bound(implied: Identif
     zeta, plant = 1e-3, PlantModel(7.0, (), (), 0.01)
     for size, robust in ((0.8, False), (0.4, True)):
         bound = AdditiveBound(2.4 * zeta * size, (), (Mode(33.3, zeta), Mode(300.0, 0.5)), (200.0,), ())
-        found = audit(design_extended(plant, bound, [1.5], 4.0, [(2.0, 1.0)]))
+        found = audit(design_extended(IdentifiedModel(plant, bound), [1.5], 4.0, [(2.0, 1.0)]))
         assert not isinstance(found.margins, str)
         assert found.margins.is_guaranteed == robust
         assert all((sector > 0) == robust for sector in found.robust_sector.values())
@@ -190,9 +192,7 @@ def test_the_robust_sector_sees_a_narrow_resonance_of_the_bound(implied: Identif
 
 
 def test_an_unstable_loop_has_no_robust_sector(implied: IdentifiedModel) -> None:
-    found = audit(
-        design_extended(implied.plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=10.0)
-    )
+    found = audit(design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=10.0))
     assert isinstance(found.margins, str)
     assert set(found.robust_sector.values()) == {0.0}
 
@@ -201,7 +201,9 @@ def test_an_unstable_loop_has_no_robust_sector(implied: IdentifiedModel) -> None
 def test_slow_and_fast_plants(implied: IdentifiedModel, scale: float) -> None:
     plant = PlantModel(7.0 * scale, (Mode(175 * scale, 0.01),), (Mode(282 * scale, 0.02),), 0.008 / scale)
     bound = AdditiveBound.printed_form(0.002, 20.0 * scale, 280.0 * scale, 0.02)
-    design = design_extended(plant, bound, [1.5 * scale, 10 * scale], 4.0 * scale, [(3 * scale, 2.25 * scale**2)] * 2)
+    design = design_extended(
+        IdentifiedModel(plant, bound), [1.5 * scale, 10 * scale], 4.0 * scale, [(3 * scale, 2.25 * scale**2)] * 2
+    )
     found = audit(design)
     assert not isinstance(found.margins, str)
     assert not isinstance(found.roots, str)

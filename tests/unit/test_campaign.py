@@ -157,7 +157,7 @@ def test_a_run_that_diverges_is_a_result(campaign: Campaign, monkeypatch: pytest
 
 @pytest.mark.parametrize("limit", [20.0, 90.0])
 def test_a_guarantee_within_the_bound_covers_the_runs_that_need_less(table: IdentifiedModel, limit: float) -> None:
-    design = design_extended(table.plant, table.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
+    design = design_extended(table, [1.5], 4.0, [(2.0, 1.0)])
     kind, reference = design.compensator("corrected"), thesis_reference("extended", (1.5,))
     columns = run_chunk(Campaign(design, f"robust {limit}", 1, reference, limit, 5, code_sha256()), 0, 2)
     assert columns["guaranteed_sector"] == [0, 0, guarantee_within(design, kind).sector] * 2

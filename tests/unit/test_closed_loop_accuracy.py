@@ -59,7 +59,7 @@ def extended_at(delay_s: float) -> Design:
     """Chapter 4's design for the plant with another dead time."""
     model = model_named("implied")
     plant = dataclasses.replace(model.plant, delay_s=delay_s)
-    return design_extended(plant, model.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
+    return design_extended(dataclasses.replace(model, plant=plant), [1.5], 4.0, [(2.0, 1.0)])
 
 
 def compensator(design: Design, kind: str) -> AntiWindup | None:

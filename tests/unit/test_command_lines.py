@@ -152,7 +152,7 @@ def test_simulate_writes_what_it_promises(runner: CliRunner, tmp_path: Path, ext
 def test_simulate_takes_a_theta1_of_the_design_and_several_amplitudes(
     runner: CliRunner, tmp_path: Path, implied: IdentifiedModel
 ) -> None:
-    design = design_extended(implied.plant, implied.additive_bound, [1.5, 3.0], 4.0, [(2.0, 1.0), (2.0, 4.0)])
+    design = design_extended(implied, [1.5, 3.0], 4.0, [(2.0, 1.0), (2.0, 4.0)])
     kind = from_one_plus(Block(1.0, (0j,), (-25.0 + 0j,)))
     mine = dataclasses.replace(
         design, added={"mine": Compensator(kind, judge(implied.plant, implied.additive_bound, kind))}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from data.thesis import model_named, printed
+from data.thesis import model_named, printed_numbers
 from design.anti_windup.compensator import AntiWindup, second_order, uncertainty_cost
 from design.blocks.block import Block, plant_block, plant_denominator, plant_numerator
 from design.blocks.frequency_peak import peak
@@ -123,7 +123,7 @@ def designs(implied: IdentifiedModel, extended_design: Design) -> list[Design]:
     """Extended designs of the thesis's plant and of a random one with a longer dead time."""
     plant = dataclasses.replace(random_plant(np.random.default_rng(7)), delay_s=0.04)
     bound = AdditiveBound.printed_form(0.0015 * plant.gain, 20.0, 280.0, 0.01)
-    return [extended_design, design_extended(plant, bound, [2.5], 3.0, [(3.0, 2.0)])]
+    return [extended_design, design_extended(IdentifiedModel(plant, bound), [2.5], 3.0, [(3.0, 2.0)])]
 
 
 # section 2.1
@@ -809,7 +809,7 @@ def test_4_9_the_bound_printed_again() -> None:
 
 
 def test_tables_4_1_and_4_2_as_printed() -> None:
-    chosen = printed()["extended"]
+    chosen = printed_numbers()["extended"]
     assert (chosen["a"], chosen["e"], chosen["f"]) == (4, 2, 1)
     Q = by_zeros(conditions([chosen["reference"]["omega"]], 8.1e-3, chosen["a"]), [(chosen["e"], chosen["f"])])
     for found, as_printed, half in zip(Q.numerator, (6.2496, 6.89, 4.1296), (5e-5, 5e-3, 5e-5), strict=True):

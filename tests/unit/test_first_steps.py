@@ -23,6 +23,7 @@ from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference, SampledReference, sinusoid
+from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 FREE = (-np.inf, np.inf)
@@ -89,7 +90,7 @@ def integrator(delay_s: float) -> PlantModel:
 @lru_cache
 def rolled_off() -> Design:
     """T_so rolls off by three poles: the path from r to u begins with t^3."""
-    return design_extended(integrator(0.05), BOUND, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9)
+    return design_extended(IdentifiedModel(integrator(0.05), BOUND), [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9)
 
 
 @pytest.mark.parametrize(
@@ -129,12 +130,12 @@ def designs() -> dict[str, Design]:
     one_mode = PlantModel(2.3, (Mode(40.0, 0.05),), (Mode(60.0, 0.03),), 0.01)
     return {
         "roll-off": rolled_off(),
-        "roll-off, implied": design_extended(
-            implied.plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9
+        "roll-off, implied": design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9),
+        "inverse epsilon": design_extended(
+            IdentifiedModel(one_mode, BOUND), [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=0.01
         ),
-        "inverse epsilon": design_extended(one_mode, BOUND, [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=0.01),
-        "thesis": design_extended(one_mode, BOUND, [1.5], 4.0, [(2.0, 1.0)]),
-        "delay-free": design_delay_free(integrator(0.0), BOUND, 4.0, 1e-4),
+        "thesis": design_extended(IdentifiedModel(one_mode, BOUND), [1.5], 4.0, [(2.0, 1.0)]),
+        "delay-free": design_delay_free(IdentifiedModel(integrator(0.0), BOUND), 4.0, 1e-4),
     }
 
 
@@ -165,7 +166,7 @@ def test_the_first_steps_are_those_of_collocation(name: str, reference: str, lim
 def test_a_brief_dead_time_in_a_loop_that_saturates_at_once(kind: str) -> None:
     implied = model_named("implied")
     plant = dataclasses.replace(implied.plant, delay_s=1e-5)  # 1 % of its fastest time constant
-    design = design_extended(plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
+    design = design_extended(dataclasses.replace(implied, plant=plant), [1.5], 4.0, [(2.0, 1.0)])
     anti_windup = None if kind == "none" else design.compensator(kind)
     loop = design_loop(design, REFERENCES["cosine"], anti_windup)
     assert compile_loop(loop).brief.all()

@@ -14,6 +14,7 @@ from sweep_columns import COLUMNS, FREQUENCY_HZ, RESPONSE
 
 from data.thesis import THESIS
 from identification.base.errors import InputError
+from identification.sweeps.kept_responses import write_responses
 from identification.sweeps.read_sweeps import input_files, read_sweeps
 from identification.sweeps.response import FrequencyResponse
 
@@ -379,3 +380,17 @@ def test_no_changed_number_raises_anything_else(
     path = tmp_path / "sweep.csv"
     path.write_text("\n".join(map(",".join, cells)), encoding="utf-8", errors="replace", newline="")
     assert _read_or_refused_in_one_line(path)
+
+
+def test_responses_that_were_kept_are_read_as_they_were(tmp_path: Path) -> None:
+    raw = THESIS.parent / "elevation" / "synthetic_test_1_raw.csv"
+    tests = [*read_sweeps([raw]), _only_test(_write(tmp_path, FRF))]
+    write_responses(tmp_path / "kept.npz", tests)
+    for test, same in zip(tests, read_sweeps([tmp_path / "kept.npz"]), strict=True):
+        assert (same.name, same.synthetic, same.path, same.record) == (test.name, test.synthetic, test.path, None)
+        for name in ("omega", "response", "coherence", "excitation"):
+            np.testing.assert_array_equal(getattr(same, name), getattr(test, name))
+    for content in (b"", b"PK", (tmp_path / "kept.npz").read_bytes()[:500]):
+        (tmp_path / "bad.npz").write_bytes(content)
+        with pytest.raises(InputError, match=r"bad\.npz: not the responses"):
+            read_sweeps([tmp_path / "bad.npz"])

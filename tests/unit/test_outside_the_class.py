@@ -28,7 +28,7 @@ def loop_with_delay(design: Design, delay_s: float) -> DelayLoop:
 @pytest.mark.parametrize("delay_s", [0.0081, 0.05])
 def test_the_range_of_true_dead_times(implied: IdentifiedModel, delay_s: float) -> None:
     model = dataclasses.replace(implied, plant=dataclasses.replace(implied.plant, delay_s=delay_s))
-    design = design_extended(model.plant, model.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
+    design = design_extended(model, [1.5], 4.0, [(2.0, 1.0)])
     margins = audit(design).margins
     assert not isinstance(margins, str)
     least, greatest = margins.delay_least_s.value, margins.delay_greatest_s.value
@@ -102,15 +102,15 @@ def test_a_limited_input_holds_an_unstable_plant_near_zero_only() -> None:
 
 def test_the_approximate_inverse_is_stable_for_small_epsilon_only(implied: IdentifiedModel) -> None:
     """(3.2) with R_eps: the characteristic equation is no longer (3.5), and the audit counts its roots."""
-    stable = design_extended(implied.plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=1e-3)
+    stable = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=1e-3)
     assert not isinstance(audit(stable).margins, str)
-    unstable = design_extended(implied.plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=1.0)
+    unstable = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=1.0)
     assert "right half plane" in str(audit(unstable).margins)
 
 
 def test_a_plant_with_two_integrators_is_refused_with_the_reason(implied: IdentifiedModel) -> None:
     plant = PlantModel(1.0, (Mode(50.0, 0.1),), (Mode(80.0, 0.1),), 0.01, integrators=2)
     with pytest.raises(ValueError, match=r"has 2 integrators; the design expects exactly one.*\(3\.2\) and \(3\.16\)"):
-        design_extended(plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)])
+        design_extended(dataclasses.replace(implied, plant=plant), [1.5], 4.0, [(2.0, 1.0)])
     with pytest.raises(ValueError, match="has 2 integrators"):
         stabiliser(plant, Block(1.0, (), (-1 + 0j, -1 + 0j)))

@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from experiments.engine.crossings import leave
-from experiments.engine.kinks import gap, insert, shift
+from experiments.engine.crossings import leaves_mode
+from experiments.engine.kinks import insert, largest_difference, shift
 from experiments.engine.step_table import advance, compressed, tabulate
 
 STEP = 0.3
@@ -100,9 +100,9 @@ def test_a_shifted_polynomial_is_the_same_polynomial(delta: float) -> None:
 
 def test_the_gap_is_the_difference_half_a_step_around() -> None:
     left, right = np.array([1.0, 2.0, 0.5]), np.array([1.0 + 2 * 0.2 + 0.5 * 0.04, 2.0 + 0.2, 0.5])
-    assert gap(left.copy(), 2, 0.2, right, 2, 0.5, np.zeros((2, 3))) < 1e-15
+    assert largest_difference(left.copy(), 2, 0.2, right, 2, 0.5, np.zeros((2, 3))) < 1e-15
     right[1] += 1e-6  # a kink
-    assert gap(left.copy(), 2, 0.2, right, 2, 0.5, np.zeros((2, 3))) == pytest.approx(0.5e-6)
+    assert largest_difference(left.copy(), 2, 0.2, right, 2, 0.5, np.zeros((2, 3))) == pytest.approx(0.5e-6)
 
 
 def test_the_queue_is_sorted_and_holds_a_time_once() -> None:
@@ -114,6 +114,6 @@ def test_the_queue_is_sorted_and_holds_a_time_once() -> None:
 
 def test_a_control_that_jumps_over_a_limit_leaves_its_mode_at_once() -> None:
     U = np.array([-9.0, 0.1, 0.0])
-    assert leave(U, 2, 1, 0, False, -1.0, 1.0, 1.0) == (0.0, 0, 0)
-    assert leave(U, 2, 0, 0, False, -1.0, 1.0, 1.0) == (0.0, -1, 0)
-    assert leave(U, 2, -1, 0, False, -1.0, 1.0, 1.0) == (-1.0, -1, 0)
+    assert leaves_mode(U, 2, 1, 0, False, -1.0, 1.0, 1.0) == (0.0, 0, 0)
+    assert leaves_mode(U, 2, 0, 0, False, -1.0, 1.0, 1.0) == (0.0, -1, 0)
+    assert leaves_mode(U, 2, -1, 0, False, -1.0, 1.0, 1.0) == (-1.0, -1, 0)

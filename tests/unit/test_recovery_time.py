@@ -71,7 +71,10 @@ def test_f_of_a_plant_that_once_showed_the_opposite() -> None:
     plant = PlantModel(plant.gain, (Mode(13.998610151745932, 0.0081),), plant.pole_modes, plant.delay_s)
     bound = AdditiveBound(0.0930769359974999, (), (), (), (23.246528149884053,))
     times = (0.08, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
-    found = [design_extended(plant, bound, [1.5], 4.0, [(2.0, 1.0)], recovery_s=time).corrected for time in times]
+    found = [
+        design_extended(IdentifiedModel(plant, bound), [1.5], 4.0, [(2.0, 1.0)], recovery_s=time).corrected
+        for time in times
+    ]
     judged = [each.judgement for each in found]
     assert [each.bandwidth for each in found] == pytest.approx([64.83351679861622] * len(times))
     assert all(np.diff([each.f for each in judged]) <= 2 * WORTH * judged[0].f)
@@ -125,7 +128,7 @@ def test_a_whole_extended_design_in_other_units(
             AdditiveBound.printed_form(gain * k, corner / T, omega / T, zeta),
         )
         factors = [(e / T, f / T**2) for e, f, _ in pairs]
-        design = design_extended(model.plant, model.additive_bound, omegas / T, 2.0 / T, factors, robust_level=level)
+        design = design_extended(model, omegas / T, 2.0 / T, factors, robust_level=level)
         rolled = design.free.roll_off
         found = {"roll_off": rolled.rate * T if rolled is not None and rolled.order else 0.0}
         for name, each in design.anti_windup.items():

@@ -301,7 +301,7 @@ def models(draw: st.DrawFn) -> IdentifiedModel:
 def test_margins_of_random_extended_designs(
     model: IdentifiedModel, omega: float, a: float, mismatch: float, detuned: bool
 ) -> None:
-    design = design_extended(model.plant, model.additive_bound, reference_omegas=[omega], a=a, pairs=[(2.0, 1.0)])
+    design = design_extended(model, reference_omegas=[omega], a=a, pairs=[(2.0, 1.0)])
     plant = dataclasses.replace(model.plant, delay_s=mismatch * model.plant.delay_s)
     if detuned:  # so that the controller's zeros and poles no longer cancel the plant's
         plant = dataclasses.replace(

@@ -39,7 +39,7 @@ REFERENCE = sinusoid(1.0, 0.5, 0.3, 0.2)
 @pytest.fixture(scope="module")
 def other_design(implied: IdentifiedModel) -> Design:
     bound = AdditiveBound.printed_form(0.002, 2.0, 30.0, 0.02)
-    return design_extended(OTHER, bound, [0.5], 1.5, [(1.0, 0.25)])
+    return design_extended(IdentifiedModel(OTHER, bound), [0.5], 1.5, [(1.0, 0.25)])
 
 
 def compensator(design: Design, name: str) -> AntiWindup | None:

@@ -23,7 +23,7 @@ LIMIT = 80.0
 def design(implied: IdentifiedModel) -> Design:
     plant = PlantModel(-0.4, (Mode(20.0, 0.03),), (Mode(32.0, 0.02),), 0.06)
     bound = AdditiveBound.printed_form(0.002, 2.0, 30.0, 0.02)
-    return design_extended(plant, bound, [0.5], 1.5, [(1.0, 0.25)])
+    return design_extended(IdentifiedModel(plant, bound), [0.5], 1.5, [(1.0, 0.25)])
 
 
 @pytest.fixture(scope="module")

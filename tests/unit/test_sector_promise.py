@@ -184,7 +184,7 @@ def test_the_promise_is_kept(extended_design: Design, phase: float, limit: float
 
 def test_the_promise_is_kept_within_the_bound(implied: IdentifiedModel) -> None:
     """The same for plants within W_a, v and v_s being those of each one's own linear loop."""
-    design = design_extended(implied.plant, implied.additive_bound, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.5)
+    design = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.5)
     kind = design.compensator("corrected")
     given_within = guarantee_within(design, kind)
     assert 0.9 < given_within.sector < circle_sector(kind.theta1_tilde)
@@ -275,7 +275,7 @@ LIMIT_CYCLE = IdentifiedModel(
 @pytest.fixture(scope="module")
 def limit_cycle() -> Design:
     """Its corrected anti-windup does not let a step of 1 settle under +-5."""
-    return design_extended(LIMIT_CYCLE.plant, LIMIT_CYCLE.additive_bound, reference_omegas=[0.0], a=20.0, pairs=[])
+    return design_extended(LIMIT_CYCLE, reference_omegas=[0.0], a=20.0, pairs=[])
 
 
 def said(command: str, design: Design, folder: Path, *arguments: str) -> str:

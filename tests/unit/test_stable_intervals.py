@@ -18,6 +18,7 @@ from design.stability.delay_loop import DelayLoop
 from design.stability.margins import Margins, delay_loop, margins_of
 from design.stability.stable_intervals import Interval
 from identification.base.errors import InputError
+from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, Mode, PlantModel
 
 ONE, NONE = Block(1.0), Block(0.0)
@@ -27,7 +28,7 @@ BOUND = AdditiveBound.printed_form(0.01, 2.0, 3.0, 0.5)
 def three_frequencies(delay_s: float) -> Design:
     """1/s under three reference frequencies 1, 2, 3 rad/s and T_so with eight poles at -3."""
     plant = PlantModel(1.0, (), (), delay_s)
-    return design_extended(plant, BOUND, [1.0, 2.0, 3.0], 3.0, [(6.0, 9.0)] * 3)
+    return design_extended(IdentifiedModel(plant, BOUND), [1.0, 2.0, 3.0], 3.0, [(6.0, 9.0)] * 3)
 
 
 def values(intervals: tuple[Interval, ...]) -> list[float]:
@@ -134,7 +135,9 @@ def test_a_hole_in_the_true_dead_times() -> None:
 
 def test_a_design_with_close_frequencies() -> None:
     plant = PlantModel(0.330613, (Mode(6.511, 0.01199),), (Mode(4.641, 0.01122),), 0.00464677)
-    design = design_extended(plant, BOUND, [1.07321, 1.27896, 0.0], 10.33, [(3.988, 10.05), (14.276, 77.22)])
+    design = design_extended(
+        IdentifiedModel(plant, BOUND), [1.07321, 1.27896, 0.0], 10.33, [(3.988, 10.05), (14.276, 77.22)]
+    )
     loop = delay_loop(design, plant)
     margins = margins_of(loop, BOUND)
     assert margins.gain_up.value == pytest.approx(9.42, abs=0.05)
@@ -208,7 +211,9 @@ def random_loop(random: np.random.Generator) -> DelayLoop:
     count, number = random.choice([0, 0, 1, 2]), random.integers(1, 4)
     modes = [Mode(random.uniform(2.0, 60.0), random.choice([0.005, 0.05, 0.3])) for _ in range(2 * count)]
     plant = PlantModel(random.uniform(0.2, 5.0), tuple(modes[:count]), tuple(modes[count:]), h)
-    design = design_extended(plant, BOUND, [1.0, 2.0, 3.0][:number], rate, [(2 * rate, rate**2)] * number)
+    design = design_extended(
+        IdentifiedModel(plant, BOUND), [1.0, 2.0, 3.0][:number], rate, [(2 * rate, rate**2)] * number
+    )
     moved, gain = random.choice([1.0] * 6 + [0.97, 1.04]), plant.gain * random.choice([1.0] * 6 + [1.1])
     return delay_loop(design, dataclasses.replace(plant, gain=gain, delay_s=float(moved) * h))
 
@@ -262,7 +267,7 @@ def test_margins_do_not_depend_on_units(unit: float, gain: float) -> None:
 def test_the_roots_of_a_smith_predictor_are_those_given(count: int, delay_s: float) -> None:
     plant = PlantModel(7.1, (Mode(120.0, 0.02),), (Mode(200.0, 0.03),), delay_s)
     frequencies = [1.5] if count == 1 else [1.0 + 0.3 * k for k in range(count)]
-    design = design_extended(plant, BOUND, frequencies, 4.0, [(2.0, 1.0)] * count)
+    design = design_extended(IdentifiedModel(plant, BOUND), frequencies, 4.0, [(2.0, 1.0)] * count)
     found = rightmost_roots(delay_loop(design, plant), 5)
     moved = found.roots[~found.hidden]
     assert sorted(moved.real) == [-4.0] * 2 + [-1.0] * (2 * count)
@@ -271,7 +276,7 @@ def test_the_roots_of_a_smith_predictor_are_those_given(count: int, delay_s: flo
 
 def test_a_long_dead_time_is_told_in_digits_that_show_its_margin() -> None:
     plant = PlantModel(7.105, (Mode(120.0, 0.02),), (Mode(200.0, 0.03),), 10.0)
-    design = design_extended(plant, BOUND, [1.5], 4.0, [(2.0, 1.0)])
+    design = design_extended(IdentifiedModel(plant, BOUND), [1.5], 4.0, [(2.0, 1.0)])
     said = audit_text(design, audit(design), 1.0)
     assert "rightmost characteristic roots  -1 (2 times), -4 (2 times)\n" in said
     assert (

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from data.thesis import printed
+from data.thesis import printed_numbers
 from experiments.__main__ import main
 from experiments.engine.simulate import Run, simulate
 from experiments.runs.design_loop import design_loop
@@ -277,13 +277,13 @@ def test_pade_moves_the_limits_by_next_to_nothing(by_delay: dict[str, Conditions
 
 def test_no_weights_or_initial_output_give_the_error_of_chapter_2(needs: pd.DataFrame) -> None:
     least, bound = (needs[needs["search"] == search].iloc[0] for search in ("weights", "any controller"))
-    assert least["limit"] == bound["limit"] == printed()["delay_free"]["limit"]
+    assert least["limit"] == bound["limit"] == printed_numbers()["delay_free"]["limit"]
     assert 2.7 < bound["computed"] <= least["computed"] < 3.0
     assert least["computed"] > 25 * least["printed"]
 
 
 def test_the_offset_free_output_betters_rest(chapter_2: pd.DataFrame) -> None:
-    varied = chapter_2[chapter_2["limit"] == printed()["delay_free"]["limit"]]
+    varied = chapter_2[chapter_2["limit"] == printed_numbers()["delay_free"]["limit"]]
     for _, rows in varied.groupby("weights"):
         rest, best = rows.iloc[-2], rows.iloc[-1]
         assert best["peak"] < rest["peak"]

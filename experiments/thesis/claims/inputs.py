@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from data.thesis import THESIS, printed
+from data.thesis import THESIS, printed_numbers
 from experiments.thesis.claims.printed_number import PrintedNumber, read_number
 from identification.model.plant import PlantModel
 from identification.model.plant_json import plant_from_dict
@@ -50,7 +50,7 @@ def rounded_inputs(ledger: pd.DataFrame) -> dict[str, PrintedNumber]:
 
 def transcribed(inputs: Inputs) -> dict[str, float]:
     """The printed inputs as data/thesis/thesis.toml holds them for the rest of this project, in the ledger's units."""
-    values = printed()
+    values = printed_numbers()
     plant, bound, pid = values["plants"]["table"], values["additive_bound"], values["pid"]
     chapter_2, chapter_4 = values["delay_free"], values["extended"]
     modes = {f"{side}{k}": mode for side in "nd" for k, mode in enumerate(plant[_SIDES[side]], start=1)}

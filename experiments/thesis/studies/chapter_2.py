@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from data.thesis import printed
+from data.thesis import printed_numbers
 from design.design_file import Design
 from experiments.runs.compare_anti_windups import loops, run_all, span, tracking_summary, tracking_table, verdicts
 from experiments.thesis.printed_choices import thesis_reference
@@ -31,7 +31,7 @@ def delay_free_tables(design: Design, limit: float | None = None) -> dict[str, p
     """
     reference = thesis_reference("delay-free", design.reference_omegas)
     limit_is_given = limit is not None
-    limit = printed()["delay_free"]["limit"] if limit is None else limit
+    limit = printed_numbers()["delay_free"]["limit"] if limit is None else limit
     horizon = PERIODS * span(design, reference)
     time_s = np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1)
     exact = loops(design, reference)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from data.thesis import printed
+from data.thesis import printed_numbers
 from design.design_file import Design
 from experiments.engine.pade import with_pade
 from experiments.engine.saturated_loop import SaturatedLoop
@@ -87,7 +87,7 @@ def desaturation(period_s: float) -> float:
     period_s
         Of the reference's slowest sinusoid; the printed one gives the printed time.
     """
-    chosen = printed()["extended"]
+    chosen = printed_numbers()["extended"]
     own = thesis_reference("extended", [chosen["reference"]["omega"]]).period_s
     return float(chosen["desaturation_s"]) * (period_s / own)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from data.thesis import printed
+from data.thesis import printed_numbers
 from design.design_file import Design
 from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies import chapter_2, chapter_4
@@ -20,7 +20,7 @@ def usual_limit(design: Design) -> float:
         There is none, see :func:`experiments.thesis.studies.chapter_4.usual_limit`.
     """
     if design.kind == "delay-free":
-        return float(printed()["delay_free"]["limit"])
+        return float(printed_numbers()["delay_free"]["limit"])
     return chapter_4.usual_limit(design)
 
 
@@ -32,5 +32,5 @@ def usual_periods(design: Design) -> int:
 def several_limits(design: Design) -> list[float]:
     """The printed limit, or 1.2 times what perfect tracking needs; and then 0.8 to 1.5 times that."""
     required = thesis_reference(design.kind, design.reference_omegas).required(design.loop_plant).value
-    usual = printed()[design.kind.replace("-", "_")].get("limit", USUAL_MULTIPLE * required)
+    usual = printed_numbers()[design.kind.replace("-", "_")].get("limit", USUAL_MULTIPLE * required)
     return [usual, *(multiple * required for multiple in MULTIPLES)]

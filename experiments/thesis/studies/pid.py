@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from data.thesis import printed
+from data.thesis import printed_numbers
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import simulate
 
@@ -62,7 +62,7 @@ def pid_tables() -> dict[str, pd.DataFrame]:
 
 def printed_benchmark() -> PidBenchmark:
     """Plant, limits and gains of section 2.2 as printed, with a step of :data:`STEP`."""
-    values = printed()["pid"]
+    values = printed_numbers()["pid"]
     return PidBenchmark(
         gain=values["gain"],
         time_constant_s=values["time_constant_s"],

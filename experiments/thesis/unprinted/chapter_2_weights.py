@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from data.thesis import printed
+from data.thesis import printed_numbers
 from design.blocks.block import Block
 from design.design_file import Design
 from design.hinf.mixed_sensitivity import mixed_sensitivity
@@ -196,7 +196,7 @@ def delay_free_scan(
         for share in limits
     ]
     rows = threaded(lambda job: _row(job[0], usual[job[0]], USUAL, job[1], job[2]), jobs, tick)
-    limit = printed()["delay_free"]["limit"]
+    limit = printed_numbers()["delay_free"]["limit"]
 
     varied: list[tuple[str, Loop, Weights]] = []
     for name, choice in product(sets, weights):  # one by one: the synthesis turns warnings into errors, for all threads
@@ -236,7 +236,7 @@ def delay_free_rows(sets: Sequence[str], scan: pd.DataFrame, tick: Tick = lambda
         "weights", reading "peak_percent": the least error at the printed limit. Rows "any controller": the lower
         bound of :func:`experiments.physical_limits.integrator_bound.least_peak_error` there.
     """
-    limit, rows = printed()["delay_free"]["limit"], []
+    limit, rows = printed_numbers()["delay_free"]["limit"], []
     number = printed_outcomes()[OUTCOME]
     head = {"outcome": OUTCOME, "delay": "none"}
     for name in sets:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from experiments.engine.simulate import Run
-from experiments.runs.metrics import last_saturation
+from experiments.runs.metrics import last_saturation, settling_time
 from experiments.thesis.claims.ledger import read_ledger
 from experiments.thesis.claims.printed_number import PrintedNumber, read_number
 
@@ -124,13 +124,10 @@ def settled_s(time_s: np.ndarray, error: np.ndarray, band: float) -> float:
     band
         In the unit of the error.
     """
-    size = np.abs(error)
-    outside = np.flatnonzero(~(size <= band))
-    if not len(outside):
-        return float(time_s[0])
-    last = outside[-1]
-    if last == len(time_s) - 1:
-        return math.nan
+    first = settling_time(time_s, error, band)
+    if not first > time_s[0]:  # from the beginning, or never
+        return first
+    last = int(np.searchsorted(time_s, first)) - 1
     # e and not |e| is smooth: it enters through the side of the band on which it was
     edge = math.copysign(band, error[last])
     share = (error[last] - edge) / (error[last] - error[last + 1])

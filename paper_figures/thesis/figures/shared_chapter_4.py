@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from data.thesis import printed
+from data.thesis import printed_numbers
 from experiments.thesis.studies.chapter_4 import PERIODS, desaturation
 from paper_figures.look.captions import duration, last_saturated, number, of_run
 
@@ -22,7 +22,7 @@ def chosen_limit(tables: Mapping[str, pd.DataFrame]) -> str:
     if of_run(summary, "none", "limit_is_given"):
         return f"Under the given limits of +-{number(limit, 4)} the loop without anti-windup {last_saturated(time_s)}."
     target = desaturation(float(tables["extended"]["time_s"].iloc[-1]) / PERIODS)
-    printed_s = float(printed()["extended"]["desaturation_s"])
+    printed_s = float(printed_numbers()["extended"]["desaturation_s"])
     when = "at around 4 seconds, as the text says"
     if not math.isclose(target, printed_s, rel_tol=1e-6):
         when = f"at around {duration(target)}, as late in the reference's period as the text says"

@@ -17,7 +17,7 @@ from identification.base.errors import InputError
 from identification.base.files import read_bytes
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
-from identification.sweeps.read_sweeps import input_files, read_sweeps
+from identification.sweeps.read_sweeps import KEPT, input_files, read_sweeps
 from identification.sweeps.response import FrequencyResponse, alias_free
 from paper_figures.summary.of_designs import FOLLOWING
 
@@ -111,7 +111,7 @@ def read_inputs(
         A file is missing that no refusal accounts for, is not what it should be, or is of another model.
     """
     hashes: list[tuple[str, str]] = []
-    files: list[Path] = [*input_files(sweeps)]
+    files: list[Path] = []
 
     def read(path: Path, name: str) -> str:
         content = read_bytes(path)
@@ -125,7 +125,8 @@ def read_inputs(
     designs, outcomes = without_path(designs), without_path(outcomes)
     identified = model_named(model)
     tests = [alias_free(test, identified.plant) for test in read_sweeps(sweeps)]
-    hashes += [(path.name, sha256(read_bytes(path)).hexdigest()) for path in files]
+    files += dict.fromkeys([*(test.path for test in tests if test.path), *input_files(sweeps)])
+    hashes += [(path.name, sha256(read_bytes(path)).hexdigest()) for path in files if path.suffix != KEPT]
     for source in SOURCES:
         if (path := THESIS.parent.parent / source).is_file():
             read(path, source)

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from data.thesis import printed
+from data.thesis import printed_numbers
 from design.blocks.block import Block
 from design.design_file import Design
 from design.hinf.mixed_sensitivity import mixed_sensitivity
@@ -33,7 +33,7 @@ def delay_free_runs(inputs: Inputs) -> dict[str, float]:
     exceeds by 1 % at most. And (section 3.2) the scheme cannot be applied with a dead time: (2.5) for that plant is
     F_2 = (Lambda - A)/(B exp(-T_d s)), which looks ahead.
     """
-    chosen = printed()["delay_free"]
+    chosen = printed_numbers()["delay_free"]
     limit, amplitude = chosen["limit"], chosen["reference"]["amplitude"]
 
     def cannot_follow(weights: str) -> bool:
@@ -90,7 +90,7 @@ def long_run(weights: str, anti_windup: str | None) -> Run:
     reference = thesis_reference("delay-free", design.reference_omegas)
     time_s = np.linspace(0.0, PERIODS * reference.period_s, 500 * PERIODS + 1)
     loop = design_loop(design, reference, design.compensator(anti_windup) if anti_windup else None)
-    return run_all({"run": loop}, printed()["delay_free"]["limit"], time_s)["run"]
+    return run_all({"run": loop}, printed_numbers()["delay_free"]["limit"], time_s)["run"]
 
 
 def grows(run: Run) -> bool:

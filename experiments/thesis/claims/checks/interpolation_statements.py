@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import control
 import numpy as np
 
-from data.thesis import printed
+from data.thesis import printed_numbers
 from design.chapters_3_4.interpolate_Q import Conditions, by_poles, by_zeros, conditions, lagrange
 from experiments.thesis.claims.checks.statements import NOTHING
 from experiments.thesis.claims.inputs import Inputs, plant_of
@@ -28,7 +28,7 @@ def interpolation(inputs: Inputs) -> Mapping[str, float]:
     any stable Q that meets (4.4) at the thesis's frequency. The statement that this is always the number of conditions
     less one is tried there and at 2/T_d.
     """
-    chosen = printed()["extended"]
+    chosen = printed_numbers()["extended"]
     plant, omega = plant_of(inputs), chosen["reference"]["omega"]
     wanted = conditions([omega], plant.delay_s, chosen["a"])
     Q = by_zeros(wanted, [(chosen["e"], chosen["f"])])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from data.thesis import printed
+from data.thesis import printed_numbers
 from design.chapters_3_4.interpolate_Q import by_zeros, conditions
 from experiments.thesis.claims.inputs import Inputs, plant_of
 from experiments.thesis.studies.f_gamma import f_gamma_tables
@@ -28,7 +28,7 @@ def table_2_1(inputs: Inputs) -> dict[str, float]:
 
 def table_4_2(inputs: Inputs) -> dict[str, float]:
     """b, c and d of Q, Thesis Eq. (4.6) and (4.7)."""
-    chosen = printed()["extended"]
+    chosen = printed_numbers()["extended"]
     wanted = conditions([chosen["reference"]["omega"]], plant_of(inputs).delay_s, chosen["a"])
     Q = by_zeros(wanted, [(chosen["e"], chosen["f"])])
     return {f"table_4_2.{name}": value for name, value in zip("bcd", Q.numerator, strict=True)}
@@ -40,7 +40,7 @@ def anti_windup(inputs: Inputs) -> dict[str, float]:
     ``anti_windup.beta`` is the best of the four values that our Fig. 2.10 compares, ``anti_windup.beta_continuous`` the
     best of all.
     """
-    found = f_gamma_tables(bound_from_dict(printed()["additive_bound"]))["f_gamma_summary"].iloc[0]
+    found = f_gamma_tables(bound_from_dict(printed_numbers()["additive_bound"]))["f_gamma_summary"].iloc[0]
     return {
         "anti_windup.alpha": float(found["alpha"]),
         "anti_windup.beta": float(found["beta"]),

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from data.thesis import model_named, printed
+from data.thesis import model_named, printed_numbers
 from design.blocks.block import Block
 from design.chapters_3_4.design_extended import design_extended
 from design.stability.characteristic_roots import rightmost_roots
@@ -37,7 +37,7 @@ def pid(inputs: Inputs) -> dict[str, float]:
     """
     tables = pid_tables()
     runs, summary = tables["pid"], tables["pid_summary"].iloc[0]
-    gains = printed()["pid"]["printed_proportional"], printed()["pid"]["printed_integral"]
+    gains = printed_numbers()["pid"]["printed_proportional"], printed_numbers()["pid"]["printed_integral"]
     time_s = runs["time_s"].to_numpy()
     ripple = {
         name: over_last(time_s, runs[f"output_{name}_none"].to_numpy() - STEP, 20.0)[1]
@@ -45,7 +45,7 @@ def pid(inputs: Inputs) -> dict[str, float]:
     }
     taken = min(ripple, key=lambda name: ripple[name])
     proportional, integral = gains if taken == "printed" else gains[::-1]
-    limit = printed()["pid"]["limit"]
+    limit = printed_numbers()["pid"]["limit"]
     wound_up = []
     for name in ripple:
         middle, half = over_last(time_s, runs[f"control_{name}_none"].to_numpy(), 20.0)
@@ -84,7 +84,7 @@ def _coincide(proportional: float, integral: float) -> float:
 
 def _pid_linear_loop(proportional: float, integral: float) -> DelayLoop:
     """The benchmark's plant with C = P + I/s, without saturation."""
-    values = printed()["pid"]
+    values = printed_numbers()["pid"]
     lag = 1 / values["time_constant_s"]
     plant = Block(values["gain"] * lag, (), (complex(-lag),), values["delay_s"])
     return DelayLoop(plant, Block(proportional, (complex(-integral / proportional),), (0j,)), Block(0.0), 0.0)
@@ -92,7 +92,7 @@ def _pid_linear_loop(proportional: float, integral: float) -> DelayLoop:
 
 def delay_free(inputs: Inputs) -> dict[str, float]:
     """The least tracking error in percent of the amplitude that +-10 at the plant's input allows in chapter 2."""
-    chosen = printed()["delay_free"]
+    chosen = printed_numbers()["delay_free"]
     reference = chosen["reference"]
     omega = 2 * np.pi / reference["period_s"]
     least = least_peak_error(plant_of(inputs), chosen["limit"], reference["amplitude"], omega)
@@ -111,7 +111,7 @@ def extended(inputs: Inputs) -> dict[str, float]:
     """
     summary = extended_tables(chapter_4())["extended_summary"].set_index("run")
     last, limit = summary["relative_error_percent"], float(summary["limit"]["thesis"])
-    amplitude = printed()["extended"]["reference"]["amplitude"]
+    amplitude = printed_numbers()["extended"]["reference"]["amplitude"]
     return {
         "extended.tracking_error": float(summary["peak_error_after_1s"]["none"]),
         "extended.recovery_s": float(summary["last_saturation_s"]["thesis"]),
@@ -128,7 +128,7 @@ def _recovery(share: float, limit: float) -> float:
     design = chapter_4()
     model = model_named("implied")
     shorter = replace(model.plant, delay_s=share * model.plant.delay_s)
-    other = design_extended(shorter, model.additive_bound, design.reference_omegas, design.free.a, design.free.pairs)
+    other = design_extended(replace(model, plant=shorter), design.reference_omegas, design.free.a, design.free.pairs)
     reference = thesis_reference("extended", design.reference_omegas)
     loop = design_loop(other, reference, other.compensator("thesis"))
     return last_saturation(simulate(loop, (-limit, limit), np.array([0.0, PERIODS * reference.period_s])))

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from data.thesis import printed
+from data.thesis import printed_numbers
 from design.anti_windup.compensator import second_order
 from design.blocks.block import Block, plant_block, plant_denominator, plant_numerator
 from design.chapter_2.internal_model import reference_polynomial
@@ -72,7 +72,7 @@ def internal_model_principle(inputs: Inputs) -> Statements:
     proper = {
         factors: Block(1.0, blocks["G_A"].zeros, polynomial.zeros).relative_degree >= 0
         for factors, polynomial in {
-            "with": reference_polynomial(omega, printed()["delay_free"]["epsilon"]),
+            "with": reference_polynomial(omega, printed_numbers()["delay_free"]["epsilon"]),
             "without": Block(1.0, (1j * omega, -1j * omega)),
         }.items()
     }
@@ -93,7 +93,7 @@ def popov(inputs: Inputs) -> Statements:
     Condition ii is tried for the printed alpha and beta, several k, and gamma from just above -1/k upwards, with the
     multiplier alpha.
     """
-    chosen = printed()["delay_free"]
+    chosen = printed_numbers()["delay_free"]
     alpha, beta = chosen["alpha"], chosen["beta"]
     margins = []
     for k in SECTORS:
@@ -117,7 +117,7 @@ def _dead_zone(u: float, limit: float) -> float:
 
 def _is_the_reference(*points: float) -> bool:
     """Whether the transform of chapter 2's reference is s/(s^2 + omega_1^2) times one number, at some s in rad/s."""
-    chosen = printed()["delay_free"]["reference"]
+    chosen = printed_numbers()["delay_free"]["reference"]
     A, phase, omega = chosen["amplitude"], chosen["phase_rad"], 2 * np.pi / chosen["period_s"]
     s = np.array(points)
     waves = A * (s * np.sin(phase) + omega * np.cos(phase)) / (s**2 + omega**2)
@@ -140,7 +140,7 @@ def smith_predictor(inputs: Inputs) -> Statements:
     margins = margins_of(loop, design.additive_bound)
     one_plus_PC = 1 + plant(GRID) * C_aw
     printed_3_27 = 1 - T_so(GRID) * e / (1 + K_0 * e / GRID)
-    a = printed()["extended"]["a"]
+    a = printed_numbers()["extended"]["a"]
     Y = (1 - a / (GRID + a)) / (GRID / (GRID + a))
     return {
         "statement.delay_outside": float(_same_roots(roots, np.array(T_so.poles))),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import newton
 
-from data.thesis import printed
+from data.thesis import printed_numbers
 from design.anti_windup.compensator import second_order
 from design.blocks.block import Block, plant_block
 from design.chapter_2.internal_model import InternalModel, internal_model
@@ -57,7 +57,7 @@ def plant_4_8(inputs: Inputs) -> dict[str, float]:
 
 def bound_4_9(inputs: Inputs) -> dict[str, float]:
     """W_a of Thesis Eq. (4.9), printed as 1 + (2 zeta) s/omega + (s/omega)^2; omega in rad/s."""
-    bound = bound_from_dict(printed()["additive_bound"])
+    bound = bound_from_dict(printed_numbers()["additive_bound"])
     return {
         "W_a.gain": bound.gain,
         "W_a.corner": bound.corner,
@@ -136,17 +136,17 @@ def C_aw(inputs: Inputs) -> dict[str, float]:
 
 
 def _anti_windup() -> tuple[float, float, float]:
-    chosen = printed()["delay_free"]
+    chosen = printed_numbers()["delay_free"]
     return chosen["alpha"], chosen["beta"], chosen["gamma"]
 
 
 def _internal_model(inputs: Inputs) -> InternalModel:
-    chosen = printed()["delay_free"]
+    chosen = printed_numbers()["delay_free"]
     return internal_model(plant_of(inputs), 2 * np.pi / chosen["reference"]["period_s"], chosen["epsilon"])
 
 
 def _free_part(plant: PlantModel) -> FreePart:
-    chosen = printed()["extended"]
+    chosen = printed_numbers()["extended"]
     wanted = conditions([chosen["reference"]["omega"]], plant.delay_s, chosen["a"])
     return free_part(by_zeros(wanted, [(chosen["e"], chosen["f"])]), chosen["a"])
 
@@ -158,7 +158,7 @@ def _over_one_plus_F(block: Block, T_so: Block, delay_s: float) -> Block:
     (4.3) put there, found on the function itself: by the argument principle around s = 0 and by Newton's method
     from a point beside j omega. The thesis prints no others.
     """
-    omega = printed()["extended"]["reference"]["omega"]
+    omega = printed_numbers()["extended"]["reference"]["omega"]
 
     def one_plus_F(s: complex) -> complex:
         return complex(1 - T_so(s) * np.exp(-delay_s * s))

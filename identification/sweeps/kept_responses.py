@@ -1,0 +1,58 @@
+"""Responses that were estimated once, kept in a .npz file and read from then on like sweeps."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from identification.base.errors import InputError
+from identification.sweeps.response import FrequencyResponse
+
+CURVES = ("omega", "response", "coherence", "excitation")
+
+
+def write_responses(path: Path, tests: Sequence[FrequencyResponse]) -> None:
+    """Write tests, their raw records left out: the curves of test i as omega_i, response_i and so on."""
+    curves = {f"{name}_{i}": getattr(test, name) for i, test in enumerate(tests) for name in CURVES}
+    with path.open("wb") as file:  # a path would get another suffix
+        np.savez(
+            file,
+            allow_pickle=False,
+            name=[test.name for test in tests],
+            path=[str(test.path or "") for test in tests],
+            synthetic=[test.synthetic for test in tests],
+            **{name: curve for name, curve in curves.items() if curve is not None},
+        )
+
+
+def read_responses(path: Path) -> list[FrequencyResponse]:
+    """Read what :func:`write_responses` wrote.
+
+    Raises
+    ------
+    InputError
+        The file is missing or of another kind.
+    """
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
+            content: dict[str, Any] = dict(kept)
+        return [
+            FrequencyResponse(
+                content[f"omega_{i}"],
+                content[f"response_{i}"],
+                content.get(f"coherence_{i}"),
+                str(name),
+                content.get(f"excitation_{i}"),
+                synthetic=bool(content["synthetic"][i]),
+                path=Path(str(content["path"][i])) if content["path"][i] else None,
+            )
+            for i, name in enumerate(content["name"])
+        ]
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, EOFError, ValueError, KeyError, TypeError, IndexError, zipfile.BadZipFile):
+        raise InputError(f"{path}: not the responses that 'identification fit --responses' keeps") from None
