@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import cache
+
 import pytest
 
 from data.thesis import model_named
+from design.anti_windup import judge
+from design.auditing import audit_design
 from design.chapter_2.design_delay_free import design_delay_free
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
 from identification.model.model_file import IdentifiedModel
+
+
+@pytest.fixture(scope="session", autouse=True)
+def searched_once() -> Iterator[None]:
+    """What is searched for a W_a alone, whatever the design, is searched once a session for each."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module, name in ((judge, "corrected"), (judge, "thesis_choice"), (audit_design, "least_f")):
+            patch.setattr(module, name, cache(getattr(module, name)))
+        yield
 
 
 @pytest.fixture(scope="session")

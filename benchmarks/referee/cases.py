@@ -123,7 +123,7 @@ class Case:
     def design(self) -> Design:
         """The project's design; raises its InputError where it refuses."""
         make = design_delay_free if self.kind == "delay-free" else design_extended
-        return make(self.model.plant, self.model.additive_bound, **self.options)  # type: ignore[operator]
+        return make(self.model, **self.options)  # type: ignore[operator]
 
     @cached_property
     def reference(self) -> Reference:

@@ -191,13 +191,13 @@ def test_no_neighbour_of_the_corrected_one_that_meets_the_sector_is_better(
     one_plus = best.anti_windup.one_plus
     n = np.real(np.poly([zero for zero in one_plus.zeros if zero != 0]))
     tried = 0
-    for _ in range(300):
+    for _ in range(100):
         moved = n * np.append(1.0, np.exp(10 ** rng.uniform(-4, -1) * rng.standard_normal(2)))
         other = Block(1.0, (0j, *(complex(root) for root in np.roots(moved))), one_plus.poles)
         if popov_sector(from_one_plus(other).theta1_tilde)[0] >= 0.95:
             tried += 1
             assert uncertainty_cost(implied.additive_bound, other)[0] >= best.f_lower * (1 - 1e-4)
-    assert tried > 30
+    assert tried > 10
 
 
 def test_the_trade_off_is_monotonic(implied: IdentifiedModel) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cache
 
 import numpy as np
 import pytest
@@ -72,6 +73,7 @@ def in_units(case: Case, time: float, gain: float) -> Case:
     return *scaled, period * time, epsilon / time**2
 
 
+@cache
 def synthesise(case: Case) -> tuple[Block, Synthesis]:
     _, problem = stabiliser_problem(*case)
     return mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
@@ -84,7 +86,7 @@ def in_old_units(K: Block, case: Case, time: float, gain: float) -> Block:
     return Block(K.gain * time**K.relative_degree * time ** (degree - 1) * gain, zeros, poles)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(8))
 def test_what_is_proved_is_true(seed: int) -> None:
     """The lower bounds and the achieved norms of random plants; gamma_lower against Nehari's theorem in 60 digits."""
     _, problem = stabiliser_problem(*random_case(seed))

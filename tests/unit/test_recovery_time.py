@@ -100,7 +100,7 @@ def test_the_units_do_not_matter(
     assert other == pytest.approx(f * k, rel=1e-5, abs=RESOLVED * block_norm(bound_block(scaled))[0])
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(
     pairs=st.lists(st.tuples(st.floats(1.0, 4.0), st.floats(0.5, 9.0), st.floats(0.3, 1.5)), min_size=1, max_size=8),
     modes=st.lists(st.tuples(st.floats(0.5, 2.5), st.floats(-2.5, -0.5)), min_size=2, max_size=2),
