@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
+from pathlib import Path
 
 import pytest
 
@@ -14,6 +15,28 @@ from design.chapter_2.design_delay_free import design_delay_free
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
 from identification.model.model_file import IdentifiedModel
+
+LONGEST = (
+    "claims/test_ledger.py",  # compiles the engine, while another worker draws
+    "figures/test_data_figures.py",
+    "snapshots/test_figure_data.py",
+    "properties/test_referee.py",
+    "unit/test_unprinted_conditions.py",
+    "unit/test_fit.py",
+    "unit/test_closed_loop_accuracy.py",
+    "unit/test_physical_limits.py",
+    "snapshots/test_mutations.py",
+    "unit/test_audit.py",
+    "unit/test_anti_windup.py",
+    "unit/test_uncertainty.py",
+    "unit/test_pick.py",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The files that take longest come first, so that no worker is left with one at the end."""
+    places = {Path(__file__).parent / name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(item.path, len(LONGEST)))
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -172,7 +172,9 @@ def test_compute_names_a_function_of_a_module_of_this_room(name: str, named: boo
     ("command", "option", "target"),
     [("coverage", "--record", LEDGER), ("claims", "--page", LEDGER), ("equations", "--page", EQUATIONS)],
 )
-def test_no_command_writes_over_what_it_reads(command: str, option: str, target: Path, tmp_path: Path):
+def test_no_command_writes_over_what_it_reads(
+    command: str, option: str, target: Path, small_ledger: Path, tmp_path: Path
+):
     before = target.read_bytes()
     text = tmp_path / "text.md"
     text.write_text("7.5\n", encoding="utf-8")
