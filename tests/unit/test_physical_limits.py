@@ -200,7 +200,7 @@ def test_error_from_rest_of_an_integrator(limit: float, delay_s: float) -> None:
 
 
 def test_first_time_within_a_band_from_rest() -> None:
-    rest = RestLimit(integrator(7.105, 0.3), CHAPTER_4, 14.0, steps=100)
+    rest = RestLimit(integrator(7.105, 0.3), CHAPTER_4, 14.0, steps=60)
     found = rest.settling(0.5)
     starts = np.linspace(0.3, 1.5, 481)
     exact = next(t for t in starts if floor_of_slopes(CHAPTER_4, 7.105 * 14.0, t, 4.0, 0.3) <= 0.5)
@@ -261,7 +261,7 @@ def test_band_must_be_positive(band: float) -> None:
 @pytest.fixture(scope="module")
 def tables(extended_design: Design) -> dict[str, pd.DataFrame]:
     patch = pytest.MonkeyPatch()
-    for name, value in {"STEPS": 60, "FEWER_STEPS": 60, "STARTS": 6, "RUN_PERIODS": 6}.items():
+    for name, value in {"STEPS": 50, "FEWER_STEPS": 40, "STARTS": 4, "RUN_PERIODS": 4}.items():
         patch.setattr(least_peak_error, name, value)
     found = limits_tables(extended_design, thesis_reference("extended", (1.5,)), [12.5, 9.5])
     patch.undo()

@@ -17,7 +17,7 @@ from experiments.engine.simulate import Run, simulate
 from experiments.runs.design_loop import design_loop
 from experiments.thesis import printed_choices
 from experiments.thesis.claims.printed_number import PrintedNumber
-from experiments.thesis.unprinted import chapter_2_weights, search
+from experiments.thesis.unprinted import chapter_2_weights, joint_search, search
 from experiments.thesis.unprinted.chapter_2_weights import Weights, delay_free_rows, delay_free_scan, errors, loop_of
 from experiments.thesis.unprinted.chapter_4_conditions import Conditions, Point, starting_at, with_pade_at_rest
 from experiments.thesis.unprinted.joint_search import judged, together
@@ -233,7 +233,10 @@ def test_from_rest_each_printed_outcome_wants_another_limit(separate: pd.DataFra
     assert rest["limit_high"]["desaturation_s"] == pytest.approx(13.40, abs=0.01)
 
 
-def test_the_joint_search_betters_every_point_of_the_grid(implied_exact: Conditions, points: pd.DataFrame) -> None:
+def test_the_joint_search_betters_every_point_of_the_grid(
+    implied_exact: Conditions, points: pd.DataFrame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(joint_search, "EVALUATIONS", 20)
     found = together([implied_exact], points)
     for name, converging in (("together", False), ("together, converging", True)):
         grid = [
@@ -319,6 +322,7 @@ def test_the_command_writes_both_tables(
 ) -> None:
     small = Grid(np.array([1.1, 1.3]), np.array([1.002, 1.1]), np.array([0.9, 1.2]))
     monkeypatch.setattr(search, "usual_grid", lambda: small)
+    monkeypatch.setattr(joint_search, "EVALUATIONS", 10)
     monkeypatch.setattr(search, "every_condition", lambda: [implied_exact])
     monkeypatch.setattr(chapter_2_weights, "usual_limits", lambda: np.array([0.95, 0.99, 1.05]))
     monkeypatch.setattr(chapter_2_weights, "usual_weights", lambda: (Weights(),))
