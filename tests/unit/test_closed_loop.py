@@ -106,8 +106,10 @@ def test_first_exit_finds_the_first_of_close_roots() -> None:
     assert first_exit(g, 0.29) == -1.0
 
 
-@pytest.mark.parametrize("kind", ["none", "thesis", "corrected"])
-def test_extended_loop_agrees_with_the_independent_integrator(extended_design: Design, kind: str) -> None:
+@pytest.mark.parametrize(("kind", "horizon_s"), [("none", 0.7), ("thesis", 0.35), ("corrected", 0.35)])
+def test_extended_loop_agrees_with_the_independent_integrator(
+    extended_design: Design, kind: str, horizon_s: float
+) -> None:
     anti_windup = {
         "none": None,
         "thesis": extended_design.compensator("thesis"),
@@ -116,7 +118,7 @@ def test_extended_loop_agrees_with_the_independent_integrator(extended_design: D
     loop = design_loop(extended_design, thesis_reference("extended", [1.5]), anti_windup)
     # y is delayed: watch the plant's state behind it as well
     loop.outputs["p"] = (loop.Z[0], np.zeros(3))  # type: ignore[index]
-    t = np.linspace(0, 0.7, 71)
+    t = np.arange(0, horizon_s, 0.01)
     run = simulate(loop, (-12.0, 12.0), t)
     control, outputs = reference_run(loop, (-12.0, 12.0), t)
     assert len(run.events_s) > 3
