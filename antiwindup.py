@@ -30,3 +30,7 @@ class Rooms(click.Group):
 @click.version_option(package_name="antiwindup-thesis")
 def main() -> None:
     """From sine sweeps of a plant with dead time to its anti-windup: models, designs, saturated loops, figures."""
+
+
+if __name__ == "__main__":
+    main(prog_name="python -m antiwindup")

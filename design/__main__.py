@@ -81,10 +81,10 @@ def delay_free(
     output: Path,
 ) -> None:
     """Chapter 2: internal model, H-infinity stabiliser, anti-windup; the plant's dead time is ignored."""
-    from data.thesis import model_named
+    from design.asked_model import asked_model
     from design.chapter_2.design_delay_free import design_delay_free
 
-    given = model_named(model)
+    given = asked_model(model)
     design = design_delay_free(given, period, epsilon, recovery, sector, bandwidth)
     hinf = design.hinf
     assert hinf is not None
@@ -136,13 +136,13 @@ def extended(
     output: Path,
 ) -> None:
     """Chapters 3 and 4: Smith predictor based controller and anti-windup with the exact dead time."""
-    from data.thesis import model_named
+    from design.asked_model import asked_model
     from design.chapters_3_4.design_extended import design_extended
 
     if len(e) != len(f):
         raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected as many")
     pairs = list(zip(e, f, strict=True))
-    given = model_named(model)
+    given = asked_model(model)
     design = design_extended(
         given,
         omegas,

@@ -18,7 +18,19 @@ from experiments.thesis.commands import thesis
 from identification.base.command_line import CommandGroup
 
 
-@click.group(cls=CommandGroup)
+class Experiments(CommandGroup):
+    """Says of a command that only the group ``thesis`` has where it is."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if name in thesis.commands and name not in self.commands:
+            ctx.fail(f"No such command '{name}'; it is now: thesis {name}")
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=Experiments)
 def main() -> None:
     """Simulate saturated loops, their dead time exact."""
 

@@ -58,8 +58,8 @@ def simulate_command(
     import numpy as np
     import pandas as pd
 
-    from data.thesis import model_named
     from design.anti_windup.compensator import second_order
+    from design.asked_model import asked_model
     from design.design_file import read_design
     from experiments.asked_reference import reference_of
     from experiments.engine.simulate import simulate
@@ -85,7 +85,7 @@ def simulate_command(
     # the quotient of two decimals may come out a rounding below a whole number
     time_s = sample_time * np.arange(int(until / sample_time * (1 + 1e-12)) + 1)
     limits, asked = (-limit, limit), reference_of(content, **reference)
-    true = None if plant is None else model_named(plant).plant
+    true = None if plant is None else asked_model(plant).plant
     loop = design_loop(content, asked, kind, true)
     run = simulate(loop, limits, time_s)
     table = pd.DataFrame(
@@ -138,7 +138,7 @@ def sampled_command(
     import numpy as np
     import pandas as pd
 
-    from data.thesis import model_named
+    from design.asked_model import asked_model
     from design.design_file import read_design
     from experiments.asked_reference import reference_of
     from experiments.drive.sampled_loop import Drive, simulate_sampled
@@ -151,7 +151,7 @@ def sampled_command(
     content = read_design(design)
     kind = None if anti_windup == "none" else content.compensator(anti_windup)
     asked = reference_of(content, **reference)
-    true = None if plant is None else model_named(plant).plant
+    true = None if plant is None else asked_model(plant).plant
     run = simulate_sampled(content, asked, kind, drive, until, true)
     beyond = run.time_s[np.abs(run.control) > limit]
     last = f", the last at {beyond[-1]:.6g} s" if len(beyond) else ""

@@ -1,4 +1,4 @@
-"""The command line of the figures: ``python -m paper_figures`` with draw, summary and report.
+"""The command line of the figures: ``python -m paper_figures`` with draw, summary, bode and report.
 
 Each command imports what it runs, so that a command line answers at once, and make knows what each command hangs on.
 """
@@ -14,7 +14,7 @@ from identification.base.command_line import CommandGroup
 
 @click.group(cls=CommandGroup)
 def main() -> None:
-    """Draw the figures of the thesis."""
+    """Draw a fit, sum up a plant, draw the figures of the thesis and put them on a page."""
 
 
 @main.command()

@@ -7,7 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from identification.model.model_file import IdentifiedModel, read_model
+from identification.base.errors import MissingFile
+from identification.model.model_file import IdentifiedModel
 from identification.model.plant_json import bound_from_dict, plant_from_dict
 
 THESIS = Path(__file__).resolve().parent
@@ -23,17 +24,17 @@ def printed_numbers() -> dict[str, Any]:
 
 
 def model_named(name: str) -> IdentifiedModel:
-    """Read a model.json, or give the thesis's own sets for the words ``table`` and ``implied``.
+    """The thesis's own sets: ``table`` and ``implied``.
 
-    Both words come with the printed bound (2.22). ``table`` is Table 2.1 as printed; ``implied`` is the set
+    Both come with the printed bound (2.22). ``table`` is Table 2.1 as printed; ``implied`` is the set
     that gives back the transfer functions printed after it.
 
     Raises
     ------
-    InputError
-        See :func:`identification.model.model_file.read_model`.
+    MissingFile
+        Another name, which a file would have to have.
     """
     plants = printed_numbers()["plants"]
     if name not in plants:
-        return read_model(Path(name))
+        raise MissingFile(f"{name}: no such file")
     return IdentifiedModel(plant_from_dict(plants[name]), bound_from_dict(printed_numbers()["additive_bound"]))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from identification.base.arrays import Array
+from identification.base.compiled import njit
 
 Factors = tuple[float, float, int, Array, Array]
 Changes = tuple[float, float, Array, Array]
@@ -20,7 +20,7 @@ CLOSE = 1e-4  # how far below 1 the distance may stay
 TRIES = 60
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def response(factors: Factors, omega: float) -> complex:
     """gain exp(-delay s)/s^integrators times every factor, at s = j omega.
 
@@ -41,7 +41,7 @@ def response(factors: Factors, omega: float) -> complex:
     return value
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def moved(nominal: Factors, changes: Changes, t: float) -> Factors:
     """The factors with t times the changes (log gain, delay, log omega and log zeta (m, 2), log rates (r,))."""
     gain, delay, integrators, modes, rates = nominal
@@ -52,7 +52,7 @@ def moved(nominal: Factors, changes: Changes, t: float) -> Factors:
     return gain * np.exp(t * log_gain), max(delay + t * later, 0.0), integrators, modes, rates
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _slope(factors: Factors) -> float:
     """d/ds of the logarithm of all but gain and integrators, at s = 0."""
     _, delay, _, modes, rates = factors
@@ -64,7 +64,7 @@ def _slope(factors: Factors) -> float:
     return slope
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def leading(factors: Factors) -> tuple[float, int]:
     """k and n of k/s^n exp(-delay s) as s -> infinity."""
     gain, _, degree, modes, rates = factors
@@ -77,7 +77,7 @@ def leading(factors: Factors) -> tuple[float, int]:
     return gain, degree
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def at_the_ends(true: Factors, nominal: Factors, bound: Factors) -> float:
     """The larger of the limits of |P_true - P|/|W_a| as omega -> 0 and, the upper one, as omega -> infinity.
 
@@ -101,12 +101,12 @@ def at_the_ends(true: Factors, nominal: Factors, bound: Factors) -> float:
     return max(low / bound[0], high / w)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _ratio(true: Factors, nominal: Factors, bound: Factors, omega: float) -> float:
     return abs(response(true, omega) - response(nominal, omega)) / abs(response(bound, omega))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _refined(true: Factors, nominal: Factors, bound: Factors, omega: Array, values: Array, worst: float) -> float:
     """The highest value between the points, near whichever of them may be the highest; golden section."""
     least = NEAR * worst
@@ -129,7 +129,7 @@ def _refined(true: Factors, nominal: Factors, bound: Factors, omega: Array, valu
     return worst
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def distance(
     true: Factors, nominal: Factors, bound: Factors, omega: Array, at_nominal: Array, at_bound: Array
 ) -> float:
@@ -176,7 +176,7 @@ def distance(
     return worst
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def reach(
     nominal: Factors, changes: Changes, most: float, bound: Factors, omega: Array, at_nominal: Array, at_bound: Array
 ) -> float:

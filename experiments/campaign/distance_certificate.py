@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from experiments.campaign.distance import Factors, at_the_ends, leading, response
 from identification.base.arrays import Array
+from identification.base.compiled import njit
 
 EPS = np.finfo(float).eps
 SLACK = 1 + 1e-9  # on bounds of derivatives, whose own roundings are below 1e-11
@@ -15,7 +15,7 @@ LAST = 1e-9
 DEPTH = 60  # halvings of an interval
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def roots_of(factors: Factors) -> tuple[Array, Array]:
     """Roots in rad/s of all modes and rates, shape (n,) complex, and 1 for a zero or -1 for a pole."""
     modes, rates = factors[3], factors[4]
@@ -32,7 +32,7 @@ def roots_of(factors: Factors) -> tuple[Array, Array]:
     return roots, signs
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _logarithm(roots: Array, signs: Array, c: float, h: float) -> tuple[complex, complex, float, float]:
     """The logarithm of prod (j omega - root)^sign: its derivatives at c, and what is uncertain.
 
@@ -68,7 +68,7 @@ def _logarithm(roots: Array, signs: Array, c: float, h: float) -> tuple[complex,
     return first, second, third, doubt
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _largest(
     models: tuple[Factors, Factors, Factors],
     over: tuple[Array, Array],
@@ -115,7 +115,7 @@ def _largest(
     return min(direct, apart)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _far(models: tuple[Factors, Factors, Factors], roots: tuple[Array, Array, Array], omega: float) -> float:
     """A bound of |P_true - P|/|W_a| for all frequencies above ``omega``.
 
@@ -141,7 +141,7 @@ def _far(models: tuple[Factors, Factors, Factors], roots: tuple[Array, Array, Ar
     return (apart + off) / abs(w) * np.exp(sums[2]) * omega ** float(degree_of_bound - degree) * SLACK
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def _near(
     models: tuple[Factors, Factors, Factors],
     over: tuple[Array, Array],
@@ -175,7 +175,7 @@ def _near(
     return size * rate * np.exp(omega * rate)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def stays_below(true: Factors, nominal: Factors, bound: Factors, level: float) -> bool:
     """Whether |P_true - P|/|W_a| is proved to be at most ``level`` at every frequency.
 

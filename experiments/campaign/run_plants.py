@@ -10,9 +10,6 @@ from typing import Any
 
 import numpy as np
 
-import design
-import experiments
-import identification
 from design.design_file import Design
 from experiments.campaign.draw_plants import PlantsWithin
 from experiments.campaign.linear_stability import PerturbedLoop
@@ -78,10 +75,10 @@ class Campaign:
 def code_sha256() -> str:
     """The sha256 of this package's rooms up to this one, of their modules' names and texts."""
     digest = hashlib.sha256()
-    for room in (identification, design, experiments):
-        folder = Path(str(room.__file__)).parent
-        for module in sorted(folder.rglob("*.py")):
-            digest.update(f"{room.__name__}/{module.relative_to(folder)}".encode() + module.read_bytes())
+    above = Path(__file__).parents[2]
+    for room in ("identification", "design", "experiments"):
+        for module in sorted((above / room).rglob("*.py")):
+            digest.update(str(module.relative_to(above)).encode() + module.read_bytes())
     return digest.hexdigest()
 
 

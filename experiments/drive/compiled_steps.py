@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from experiments.drive.difference_equations import SampledBlock
 from identification.base.arrays import Array
+from identification.base.compiled import njit
 
 MOST = 1e100  # times the limits, or without limits of a state: beyond it a loop diverges
 ENORMOUS = 1e250  # a state with which no run goes on, whatever the limits
@@ -48,7 +48,7 @@ class Actuator(NamedTuple):
     slew: float
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _dot(a: Array, b: Array) -> float:
     value = 0.0
     for i in range(len(a)):
@@ -56,7 +56,7 @@ def _dot(a: Array, b: Array) -> float:
     return value
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _row(A: Array, i: int, x: Array) -> float:
     """Row i of A times x."""
     value = 0.0
@@ -65,7 +65,7 @@ def _row(A: Array, i: int, x: Array) -> float:
     return value
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _step(A: Array, b: Array, x: Array, following: Array, given: float, most: float) -> bool:
     """Replace x by A x + b given; whether all of it stays below ``most``. ``following`` is room for it."""
     small = True
@@ -77,7 +77,7 @@ def _step(A: Array, b: Array, x: Array, following: Array, given: float, most: fl
     return small
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _carry(
     A: Array, b: Array, norm: float, x: Array, term: Array, following: Array, level: float, slope: float, length: float
 ) -> None:
@@ -103,7 +103,7 @@ def _carry(
         level += slope * step
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _move(
     A: Array, b: Array, norm: float, x: Array, term: Array, following: Array,
     start: float, command: float, slew: float, since: float, until: float,
@@ -116,7 +116,7 @@ def _move(
     _carry(A, b, norm, x, term, following, command, 0.0, until - max(arrival, since))
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _given_out(actuator: Actuator, control: float) -> float:
     """The control saturated and rounded."""
     command = min(max(control, actuator.low), actuator.high)
@@ -125,7 +125,7 @@ def _given_out(actuator: Actuator, control: float) -> float:
     return command
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _late(whole: int, now: float, before: float, p: Array, k: int) -> float:
     """What a dead time gives of p at sample k, see :class:`experiments.drive.difference_equations.SampledBlock`."""
     value = 0.0
@@ -136,7 +136,7 @@ def _late(whole: int, now: float, before: float, p: Array, k: int) -> float:
     return value
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def run(
     forward: SampledBlock, feedback: SampledBlock, theta: SampledBlock, plant: Series, actuator: Actuator, T: float,
     r: Array,

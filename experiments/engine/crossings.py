@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from identification.base.arrays import Array
+from identification.base.compiled import njit
 
 MOST = 60  # degree
 JUMP = 1e-9  # a control that is further than this share beyond a limit has jumped there
@@ -23,7 +23,7 @@ def _binomials(order: int) -> np.ndarray:
 BINOMIAL = _binomials(MOST)
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _sign_changes(b: Array) -> int:
     """Sign changes in a sequence, zeros left out."""
     changes, last = 0, 0
@@ -36,7 +36,7 @@ def _sign_changes(b: Array) -> int:
     return changes
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def first_exit(g: Array, length: float) -> float:
     """The first tau in (0, length] where the polynomial g, positive at the start, becomes negative; -1 if none.
 
@@ -97,7 +97,7 @@ def first_exit(g: Array, length: float) -> float:
     return -1.0
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _root(g: Array, lo: float, hi: float) -> float:
     """The root of g in [lo, hi], g(lo) >= 0 >= g(hi): Newton kept inside a shrinking bracket."""
     tau = 0.5 * (lo + hi)
@@ -119,7 +119,7 @@ def _root(g: Array, lo: float, hi: float) -> float:
     return tau
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def leaves_mode(
     U: Array, degree: int, mode: int, on_limit: int, stuck: bool, low: float, high: float, reach: float
 ) -> tuple[float, int, int]:

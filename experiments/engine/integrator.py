@@ -12,7 +12,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from experiments.engine.compiled_loop import CompiledLoop
 from experiments.engine.crossings import leaves_mode
@@ -20,6 +19,7 @@ from experiments.engine.kinks import BEYOND, Past, drop, images, shift
 from experiments.engine.signals import change, driven, expand, fill, unfold
 from experiments.engine.step_table import NEGLIGIBLE, NOTHING, advance, dot, times, whole_lanes
 from identification.base.arrays import Array
+from identification.base.compiled import njit
 
 TRIALS = 30  # in which what brief dead times change settles,
 SETTLED = 4.0  # of what is negligible, when it moves by no more than that
@@ -37,7 +37,7 @@ class Bounds(NamedTuple):
     room: int
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def integrate(
     loop: CompiledLoop, reset_times: Array, resets: Array, low: float, high: float, samples: Array, horizon: float,
     bounds: Bounds,

@@ -6,10 +6,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from experiments.engine.crossings import MOST
 from identification.base.arrays import Array
+from identification.base.compiled import njit
 
 BEYOND = 0.5  # of a step: how far beyond its end, where no kink is, the polynomial of a cut step is read
 
@@ -38,7 +38,7 @@ class Past(NamedTuple):
     queue: Array
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+@njit(nogil=True, fastmath={"contract", "reassoc"})
 def shift(c: Array, degree: int, delta: float, work: Array) -> None:
     """Replace the coefficients of p(tau) by those of p(tau + delta): m! c_m = sum_q (m + q)! c_{m+q} delta^q/q!.
 
@@ -56,7 +56,7 @@ def shift(c: Array, degree: int, delta: float, work: Array) -> None:
         c[m] = value * INVERSE[m]
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def insert(queue: Array, queued: int, t: float, near: float) -> int:
     """Insert a time into the sorted queue, unless one is ``near`` it already; its new length."""
     k = queued
@@ -70,7 +70,7 @@ def insert(queue: Array, queued: int, t: float, near: float) -> int:
     return queued + 1
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def largest_difference(
     left: Array, left_degree: int, moved: float, right: Array, right_degree: int, radius: float, work: Array
 ) -> float:
@@ -89,7 +89,7 @@ def largest_difference(
     return most
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def images(
     past: Past, pieces: int, queued: int, delays: Array, brief: Array, step: float, negligible: Array, W: Array,
     work: Array,
@@ -113,7 +113,7 @@ def images(
     return queued
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def drop(queue: Array, queued: int, until: float) -> int:
     """Drop the times up to one from the sorted queue; its new length."""
     passed = 0

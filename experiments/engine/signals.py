@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from experiments.engine.kinks import shift
 from experiments.engine.step_table import NEGLIGIBLE, NOTHING, ROUNDING, Tables, dot, whole_lanes
 from identification.base.arrays import Array
+from identification.base.compiled import njit
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def state_terms(tables: Tables, which: int, degree: int, z: Array, columns: int, size: Array) -> None:
     """Fill size (n,) with the absolute values of x's coefficients of one degree."""
     n = len(size)
@@ -17,7 +16,7 @@ def state_terms(tables: Tables, which: int, degree: int, z: Array, columns: int,
         size[r] = abs(dot(tables.terms, which, n * degree + r, z, columns))
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+@njit(nogil=True, fastmath={"contract", "reassoc"})
 def following(tables: Tables, which: int, signal: int, degree: int, terms: Array) -> float:
     """A bound on all coefficients of a signal beyond a degree, which :func:`state_terms` of that degree gives."""
     value = 0.0
@@ -26,7 +25,7 @@ def following(tables: Tables, which: int, signal: int, degree: int, terms: Array
     return value / (degree + 1)
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def fill(z: Array, n: int, k: int, j: int, c: Array, degree: int, radius: float, negligible: float) -> int:
     """Put a delayed signal's coefficients into z but for the last, negligible ones; the degree that is left."""
     power = radius**degree
@@ -38,7 +37,7 @@ def fill(z: Array, n: int, k: int, j: int, c: Array, degree: int, radius: float,
     return degree
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def driven(z: Array, n: int, filled: Array, size: Array, reach: float) -> int:
     """The degree to which the delayed signals in z, each ``filled`` (k,) to its own, matter within ``reach`` steps."""
     degree, k = 0, len(filled)
@@ -51,7 +50,7 @@ def driven(z: Array, n: int, filled: Array, size: Array, reach: float) -> int:
     return degree
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def change(
     z: Array, n: int, k: int, j: int, past: Array, ago: float, now: Array, degree: int, radius: float, size: float,
     filled: Array, W: Array, work: Array,
@@ -79,7 +78,7 @@ def change(
     return difference
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def unfold(
     tables: Tables, which: int, k: int, z: Array, sizes: Array, known: int, radius: float, usual: int, size: Array,
     negligible: Array, P: Array, terms: Array,
@@ -133,7 +132,7 @@ def unfold(
     return most, power / radius
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def expand(
     tables: Tables, which: int, signal: int, signals: int, z: Array, sizes: Array, columns: int, degree: int, most: int,
     terms: Array, later: Array, size: Array, at: int, c: Array,

@@ -19,10 +19,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from experiments.engine.crossings import BINOMIAL, MOST
 from identification.base.arrays import Array
+from identification.base.compiled import njit
 
 ROUNDING = 1e-16
 NEGLIGIBLE = 1e-14  # a term, relative to the largest value of its signal so far
@@ -72,7 +72,7 @@ def compressed(dense: Array) -> Rows:
     return Rows(indptr.astype(np.uint32), column.astype(np.uint32), dense[row, column])
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def times(indptr: Array, indices: Array, data: Array, r: int, V: Array, i: int) -> float:
     """Row r of a matrix in compressed rows times V[i]."""
     value = 0.0
@@ -81,13 +81,13 @@ def times(indptr: Array, indices: Array, data: Array, r: int, V: Array, i: int) 
     return value
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def whole_lanes(count: int) -> int:
     """``count`` rounded up to a multiple of LANES."""
     return (count + LANES - 1) // LANES * LANES
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+@njit(nogil=True, fastmath={"contract", "reassoc"})
 def dot(table: Array, which: int, row: int, z: Array, count: int) -> float:
     """The first ``count`` entries of a row of one of two tables times those of z."""
     value = 0.0
@@ -96,7 +96,7 @@ def dot(table: Array, which: int, row: int, z: Array, count: int) -> float:
     return value
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def tabulate(rows: Rows, n: int, k: int, step: float) -> tuple[Tables, int]:
     """Tabulate a step.
 
@@ -165,7 +165,7 @@ def tabulate(rows: Rows, n: int, k: int, step: float) -> tuple[Tables, int]:
     return Tables(increments, polynomials, terms, magnitudes, influence), degree
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _laid_out(responses: Array, degree: int, n: int, k: int) -> Array:
     """Responses (p, rows, n + 1 + k) to x_0, m and w_0 as rows over z, by degree; w_i has its i degrees later."""
     rows = responses.shape[1]
@@ -180,7 +180,7 @@ def _laid_out(responses: Array, degree: int, n: int, k: int) -> Array:
     return table
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _ends(terms: Array, influence: Array, largest: Array, p: int) -> bool:
     """Whether all that follows the terms of degree p (columns, columns) is below rounding.
 
@@ -200,7 +200,7 @@ def _ends(terms: Array, influence: Array, largest: Array, p: int) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def advance(
     rows: Rows, influence: Array, V: Array, n: int, known: int, most: int, scale: Array, step: float, reach: float,
     x: Array,

@@ -1,4 +1,4 @@
-"""What is simulated: references, the PID benchmark, and the thesis's own values of both."""
+"""References of a run: sinusoids with a constant and a ramp, or samples; and the systems that generate them."""
 
 from __future__ import annotations
 

@@ -20,7 +20,10 @@ LIMIT = click.option("--limit", type=float, help="Saturation limits +-LIMIT, ins
 
 @click.group("thesis")
 def thesis() -> None:
-    """Reproduce and judge the print: its experiments, claims and equations."""
+    """Reproduce and judge the print: its experiments, claims and equations.
+
+    The option --refusal FILE stands before the word thesis.
+    """
 
 
 thesis.add_command(claims_command)
@@ -179,8 +182,8 @@ def campaign(design: Path, plants: int, seed: int, scheduler: str | None, output
 @OUTPUT_FOLDER
 def additive_error(model: str, sweeps: tuple[Path, ...], output: Path) -> None:
     """The additive error of SWEEPS against MODEL: additive_error.csv, additive_error_summary.csv."""
-    from data.thesis import model_named
+    from design.asked_model import asked_model
     from experiments.thesis.studies.additive_error import additive_error_tables
     from identification.sweeps.read_sweeps import read_sweeps
 
-    write_into(output, additive_error_tables(model_named(model), read_sweeps(sweeps)))
+    write_into(output, additive_error_tables(asked_model(model), read_sweeps(sweeps)))

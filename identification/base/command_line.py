@@ -35,7 +35,7 @@ class CommandGroup(click.Group):
 
     def __init__(self, *arguments: Any, **attributes: Any) -> None:
         super().__init__(*arguments, **attributes)
-        said = "Where a refusal is kept, a sentence; the exit status is 0 then, and when an input is missing."
+        said = "Before the command: where a refusal is kept, a sentence; status 0 then, and when an input is missing."
         self.params.append(
             click.Option(["--refusal"], type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help=said)
         )

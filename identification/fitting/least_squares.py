@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from identification.base.arrays import Complex, Real
+from identification.base.compiled import njit
 from identification.model.structure import Structure
 
 EVALUATIONS = 30
@@ -21,7 +21,7 @@ def log_jacobian(structure: Structure, theta: Real, omega: Real) -> Complex:
     return _derive(theta, structure.integrators, *structure.modes, *structure.real, omega, True)[1]
 
 
-@njit(cache=True)
+@njit()
 def _derive(theta, integrators, zero_modes, pole_modes, real_zeros, real_poles, omega, derive):  # type: ignore[no-untyped-def]
     """Response (M,) and, if asked for, the derivative of its logarithm (M, p)."""
     modes, rates = zero_modes + pole_modes, real_zeros + real_poles
@@ -77,7 +77,7 @@ def least_squares(
     return np.asarray(_least_squares(theta, counts, omega, response, sigma, *bounds, soft, tolerance))
 
 
-@njit(cache=True)
+@njit()
 def _normal(value, logs, response, sigma, soft):  # type: ignore[no-untyped-def]
     """Cost of the residuals (value - response)/sigma, its half slope (p,) and Gauss and Newton's curvature (p, p)."""
     size = logs.shape[1]
@@ -101,7 +101,7 @@ def _normal(value, logs, response, sigma, soft):  # type: ignore[no-untyped-def]
     return cost, slope, curvature
 
 
-@njit(cache=True)
+@njit()
 def _solve(matrix, shift, right):  # type: ignore[no-untyped-def]
     """Solution of (matrix + shift I) x = right by Cholesky's factors; False when it is not positive definite."""
     size = right.size
@@ -127,7 +127,7 @@ def _solve(matrix, shift, right):  # type: ignore[no-untyped-def]
     return True, x
 
 
-@njit(cache=True)
+@njit()
 def _least_squares(theta, counts, omega, response, sigma, lower, upper, soft, tolerance):  # type: ignore[no-untyped-def]
     """Levenberg and Marquardt's method; a parameter at its bound stays there while the slope pushes it out.
 

@@ -1,1 +1,1 @@
-"""Tool: the two-page summary of one plant, from its fit to its runs."""
+"""Tool: the summary on one page of one plant, from its fit to its runs."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from importlib import import_module
 from pathlib import Path
@@ -50,6 +51,9 @@ def test_the_errata_explain_every_claim_that_does_not_agree() -> None:
     assert sorted(explained) == sorted(wanted)
 
 
+REFERENCE = r":(?:func|class|mod|meth|data|attr):`~?([\w.]+)`"
+
+
 def resolves(name: str, module: str) -> bool:
     """Whether a name of a docstring is there: as it stands, in its module, or in a class of its module."""
     own = import_module(module)
@@ -74,13 +78,24 @@ def test_every_reference_in_a_docstring_resolves() -> None:
     for room in (*ROOMS, "data/thesis"):
         for path in sorted((ROOT / room).rglob("*.py")):
             module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-            for name in re.findall(
-                r":(?:func|class|mod|meth|data|attr):`~?([\w.]+)`", path.read_text(encoding="utf-8")
-            ):
+            for name in re.findall(REFERENCE, path.read_text(encoding="utf-8")):
                 found += 1
                 lost += [] if resolves(name, module) else [f"{module}: {name}"]
     assert found > 250
     assert lost == []
+
+
+@pytest.mark.parametrize("folder", ["tests", "benchmarks"])
+def test_so_does_one_of_the_tests(folder: str) -> None:
+    """They are no packages: a short name is one of its own file."""
+    names = {
+        path: re.findall(REFERENCE, path.read_text(encoding="utf-8")) for path in sorted((ROOT / folder).rglob("*.py"))
+    }
+    assert sum(map(len, names.values())) >= 3
+    for path, found in names.items():
+        own = {getattr(node, "name", "") for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))}
+        own |= set(re.findall(r"^(\w+)(?:: .+)? = ", path.read_text(encoding="utf-8"), flags=re.MULTILINE))
+        assert [name for name in found if name not in own and not resolves(name, "builtins")] == [], path
 
 
 PAGES = [ROOT / "README.md", ROOT / "data" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

@@ -89,3 +89,81 @@ def test_what_stands_beside_the_rooms_imports_none(path: Path) -> None:
         modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         modules += [str(node.module)] if isinstance(node, ast.ImportFrom) else []
         assert not names & {module.split(".")[0] for module in modules}
+
+
+ROOMS = ("identification", "design", "experiments", "paper_figures")
+INSTALLED = ("antiwindup.py", "data/thesis", *ROOMS)
+BESIDE = {"antiwindup.py", "setup.py", "benchmarks", "data", "tests", "tools"}
+BY_NAME = {
+    "antiwindup.py",
+    "experiments/thesis/claims/equations_page.py",
+    "experiments/thesis/claims/ledger.py",
+    "identification/base/faces.py",
+    "paper_figures/thesis/figure_registry.py",
+}
+"""The modules that import what a text names."""
+
+
+def past_the_contracts(tree: Path, file: str) -> list[str]:
+    """What a module does that neither import-linter nor build/prerequisites.mk sees, for which imports are read."""
+    nodes = list(ast.walk(ast.parse((tree / file).read_text(encoding="utf-8"))))
+    documents = {node.value for node in nodes if isinstance(node, ast.Expr)}
+    found = []
+    for node in nodes:
+        if isinstance(node, ast.Import):  # which gives the package, and with it the names of its face
+            found += [alias.name for alias in node.names if alias.name.split(".")[0] in ROOMS]
+        if isinstance(node, ast.ImportFrom) and (node.module in ROOMS or node.level):
+            wings = {path.stem for path in (tree / str(node.module)).iterdir()} if node.module in ROOMS else set()
+            found += [alias.name for alias in node.names if alias.name not in wings or node.level]
+        name = getattr(node, "id", None) or getattr(node, "attr", None) or getattr(node, "name", None)
+        if file not in BY_NAME and name in ("import_module", "__import__", "runpy"):
+            found.append(name)
+        if isinstance(node, ast.Constant) and node not in documents and "/thesis/" not in file:
+            found += [str(node.value)] if re.search(r"data/thesis|thesis\.toml", str(node.value)) else []
+    return found
+
+
+def all_past_the_contracts(tree: Path) -> dict[str, list[str]]:
+    """That of every module that is installed, and the Python that stands beside the rooms without a place there."""
+    paths = [
+        path for place in INSTALLED for path in ((tree / place).rglob("*.py") if "." not in place else [tree / place])
+    ]
+    found = {file: past_the_contracts(tree, file) for file in (path.relative_to(tree).as_posix() for path in paths)}
+    others = [path for path in tree.glob("[!.]*") if path.name not in {*ROOMS, *BESIDE, "build"}]
+    found |= {path.name: ["has no place"] for path in others if path.suffix == ".py" or any(path.rglob("*.py"))}
+    return {file: names for file, names in found.items() if names}
+
+
+def test_nothing_goes_past_the_contracts() -> None:
+    assert all_past_the_contracts(ROOT) == {}
+    assert all("import_module(" in (ROOT / file).read_text(encoding="utf-8") for file in BY_NAME)
+
+
+@pytest.mark.parametrize(
+    ("module", "line", "found"),
+    [
+        ("design.stability.jet", "from experiments import simulate_many", "simulate_many"),
+        ("experiments.runs.batch", "from design import audit", "audit"),
+        ("experiments.runs.batch", "import design", "design"),
+        ("experiments.runs.batch", "import design.auditing.audit_design as x", "design.auditing.audit_design"),
+        ("experiments.runs.batch", "from ..thesis import studies", "studies"),
+        ("design.auditing.as_text", "def f() -> None:\n    from identification import fit_model, fit", "fit"),
+        ("design.auditing.as_text", "from importlib import import_module as load", "import_module"),
+        ("design.auditing.as_text", "import importlib\nimportlib.import_module('data.thesis')", "import_module"),
+        ("design.auditing.as_text", "__import__('experiments.thesis')", "__import__"),
+        ("design.choices", "TABLE = 'data/thesis/claims.csv'", "data/thesis/claims.csv"),
+        ("design.choices", "from pathlib import Path\nx = Path('data') / 'thesis.toml'", "thesis.toml"),
+        ("helpers", "import design", "has no place"),
+    ],
+)
+def test_what_goes_past_them_is_found(tree: Path, module: str, line: str, found: str) -> None:
+    file = f"{module.replace('.', '/')}.py"
+    (tree / file).open("a", encoding="utf-8").close()
+    spoil(tree, module, line)
+    assert {name: set(names) for name, names in all_past_the_contracts(tree).items()} == {file: {found}}
+
+
+@pytest.mark.parametrize("line", ["from design import choices", "from design.design_file import Design"])
+def test_a_module_itself_may_be_imported(tree: Path, line: str) -> None:
+    spoil(tree, "experiments.runs.batch", line)
+    assert all_past_the_contracts(tree) == {}

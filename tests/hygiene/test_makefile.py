@@ -157,7 +157,9 @@ for command in commands:
             from experiments.thesis.claims.ledger import read_ledger
             for name in set(read_ledger()["compute"]) - {""}:
                 importlib.import_module(name.split(":")[0])
-    # experiments/__init__.py reads the room's modules to name the folder of numba's files
+    if "design.asked_model" in sys.modules:  # which imports it when it is asked for a set
+        importlib.import_module("data.thesis")
+    # identification/base/compiled.py reads the modules of a room to name the folder of numba's files
     opened = {path for path in opened if not path.endswith((".py", ".pyi")) and "__pycache__" not in path}
     opened |= {module.__file__ for module in sys.modules.values() if getattr(module, "__file__", None)}
     ours = {os.path.relpath(path, root) for path in opened if path.startswith(root + "/")}

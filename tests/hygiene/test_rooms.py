@@ -85,26 +85,32 @@ def test_lock_files_hold_what_the_project_asks_for() -> None:
         assert {re.split("[<>=!~]", requirement)[0] for requirement in requirements} <= pinned, name
 
 
-def digests(tree: Path) -> list[str]:
-    """The folder of numba's cache and the sha256 of a campaign's code, of the package in a folder."""
-    code = "import os, experiments.campaign.run_plants as r; print(os.environ['NUMBA_CACHE_DIR'], r.code_sha256())"
-    own = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    return subprocess.run(
-        [sys.executable, "-c", code], cwd=tree, env=own, capture_output=True, text=True, check=True
-    ).stdout.split()
+def run(tree: Path, code: str, **environment: str) -> list[str]:
+    """What a program prints that imports the package in a folder, under an environment of its own."""
+    own = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"} | environment
+    done = subprocess.run([sys.executable, "-c", code], cwd=tree, env=own, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split()
 
 
-def test_an_edit_in_a_wing_changes_what_the_code_is_known_by(tree: Path) -> None:
+def test_an_edit_in_a_wing_changes_what_the_code_is_known_by(tree: Path, tmp_path: Path) -> None:
     """Else a compiled function would run as it was before, and a campaign go on with other code."""
+    code = (
+        "import experiments.campaign.run_plants as r; from identification.base.compiled import code_cache;"
+        "print(code_cache('experiments'), r.code_sha256())"
+    )
+
+    def digests() -> list[str]:
+        return run(tree, code, XDG_CACHE_HOME=str(tmp_path))
 
     def edited(file: str) -> list[str]:
         with (tree / file).open("a", encoding="utf-8") as module:
             module.write("# edited\n")
-        return digests(tree)
+        return digests()
 
-    first = digests(tree)
-    assert first == digests(tree)
-    assert Path(first[0]).parent == tree / "experiments" / "__pycache__"
+    first = digests()
+    assert first == digests()
+    assert Path(first[0]).parent == tmp_path / "antiwindup"
     compiled = edited("experiments/engine/crossings.py")
     assert compiled[0] != first[0]
     assert compiled[1] != first[1]
@@ -113,10 +119,42 @@ def test_an_edit_in_a_wing_changes_what_the_code_is_known_by(tree: Path) -> None
     assert other[1] != compiled[1]
 
 
-def test_a_room_that_cannot_be_written_to_caches_in_the_users_folder(tree: Path, tmp_path: Path) -> None:
-    code = "import os; os.access = lambda *_: False; import experiments; print(os.environ['NUMBA_CACHE_DIR'])"
-    own = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    found = subprocess.run(
-        [sys.executable, "-c", code], cwd=tree, env=own | {"XDG_CACHE_HOME": str(tmp_path)}, capture_output=True
-    )
-    assert Path(found.stdout.decode().strip()).parent == tmp_path / "antiwindup"
+COMPILED = (
+    "import tempfile; tempfile.tempdir = {temporary!r}\n"
+    "import numpy as np\n"
+    "from experiments.engine import crossings\n"
+    "from identification.base.compiled import code_cache\n"
+    "crossings._sign_changes(np.array([1.0, -2.0]))\n"
+    "print(code_cache('experiments'))\n"
+)
+
+
+def test_where_compiled_code_is_kept(tree: Path, tmp_path: Path) -> None:
+    """In the user's cache folder, else below the temporary one, else nowhere; never beside the modules."""
+    users, other, barred = tmp_path / "users", tmp_path / "other", tmp_path / "barred"
+    other.mkdir()
+    barred.touch()
+    for cache, temporary, expected in (
+        ({"XDG_CACHE_HOME": str(users)}, other, users / "antiwindup"),
+        ({"XDG_CACHE_HOME": "", "HOME": str(users)}, other, users / ".cache" / "antiwindup"),
+        ({"XDG_CACHE_HOME": str(barred)}, other, other / f"antiwindup-{os.getuid()}"),
+        ({"XDG_CACHE_HOME": str(barred)}, barred, None),
+        ({"XDG_CACHE_HOME": str(barred), "NUMBA_CACHE_DIR": str(users)}, other, users),
+    ):
+        (found,) = run(tree, COMPILED.format(temporary=str(temporary)), **cache)
+        assert found == "None" if expected is None else Path(found).parent == expected
+        assert expected is None or any(Path(found).glob("*.nbc"))
+    assert [path for path in tree.rglob("*") if path.suffix in (".nbi", ".nbc")] == []
+
+
+def test_functions_of_the_users_are_kept_where_numba_keeps_them(tree: Path, tmp_path: Path) -> None:
+    (tree / "mine.py").write_text("import numba\n@numba.njit(cache=True)\ndef f():\n    return 1\n", encoding="utf-8")
+    code = "import os, experiments.engine.crossings, mine; mine.f(); print('NUMBA_CACHE_DIR' in os.environ)"
+    assert run(tree, code, XDG_CACHE_HOME=str(tmp_path / "users")) == ["False"]
+    assert [path.parent for path in tree.rglob("*.nbi")] == [tree / "__pycache__"]
+    assert not [path for path in tmp_path.rglob("mine*.nbi") if tree not in path.parents]
+
+
+def test_every_compiled_function_is_kept_so() -> None:
+    importers = [name_of(path) for path in MODULES if re.search("^(import|from) numba", path.read_text("utf-8"), re.M)]
+    assert importers == ["identification/base/compiled.py"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from data.thesis import model_named
 from design.design_file import Design
 from experiments.__main__ import main
 
@@ -26,16 +28,26 @@ def run(*command: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(list(map(str, command)), cwd=cwd, capture_output=True, text=True, check=False)
 
 
-def test_the_wheel_works_from_any_folder(tree: Path, tmp_path: Path) -> None:
-    built = run(
-        *PIP, "wheel", "--no-build-isolation", "--no-deps", "--no-index", "--wheel-dir", tmp_path, tree, cwd=tree
-    )
+def build(tree: Path, folder: Path) -> tuple[Path, set[str]]:
+    """Build a wheel into a folder: its file, and the files in it."""
+    options = ("--no-build-isolation", "--no-deps", "--no-index", "--wheel-dir", folder)
+    built = run(*PIP, "wheel", *options, tree, cwd=tree)
     assert built.returncode == 0, built.stderr
-    (wheel,) = tmp_path.glob("*.whl")
-    held = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    (wheel,) = folder.glob("*.whl")
+    return wheel, {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+
+
+def test_the_wheel_works_from_any_folder(tree: Path, tmp_path: Path) -> None:
+    gone = tree / "design" / "gone.py"
+    gone.touch()
+    assert "design/gone.py" in build(tree, tmp_path / "first")[1]
+    gone.unlink()
+    wheel, held = build(tree, tmp_path)
     files = {path for room in ROOMS for path in (ROOT / room).rglob("*") if path.is_file()}
-    modules = {path.relative_to(ROOT).as_posix() for path in files if path.suffix not in (".pyc", ".nbi", ".nbc")}
+    modules = {path.relative_to(ROOT).as_posix() for path in files if path.suffix != ".pyc"}
     assert held == modules | {"antiwindup.py"}
+    assert {f"{room}/py.typed" for room in ROOMS[:4]} < held
+    assert not (tree / "build").exists()
 
     environment = tmp_path / "environment"
     venv.create(environment)
@@ -51,6 +63,7 @@ def test_the_wheel_works_from_any_folder(tree: Path, tmp_path: Path) -> None:
     (folder / "data" / "mine.csv").touch()
     command = environment / "bin" / "antiwindup"
     assert run(command, "--version", cwd=folder).stdout == "antiwindup, version 0.1.0\n"
+    assert run(python, "-m", "antiwindup", "--version", cwd=folder).stdout == "python -m antiwindup, version 0.1.0\n"
     for number, start in enumerate(([command, "design"], [python, "-m", "design"])):
         output = folder / f"design_{number}.json"
         done = run(*start, "extended", "implied", *ASKED, "--output", output, cwd=folder)
@@ -61,6 +74,21 @@ def test_the_wheel_works_from_any_folder(tree: Path, tmp_path: Path) -> None:
 
     refused = run(command, "design", "extended", "nowhere.json", *ASKED, "--output", "x.json", cwd=folder)
     assert (refused.returncode, refused.stderr) == (2, "Error: nowhere.json: no such file\n")
+
+    # what of the user's is named data hides the thesis's sets and nothing else
+    mine = folder / "model.json"
+    mine.write_text(model_named("implied").to_json(), encoding="utf-8")
+    for name in ("data/__init__.py", "data.py"):
+        shutil.rmtree(folder / "data", ignore_errors=True)
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text("raise RuntimeError('this is mine')", encoding="utf-8")
+        done = run(python, "-m", "design", "extended", mine.name, *ASKED, "--output", output, cwd=folder)
+        assert done.returncode == 0, done.stderr
+        refused = run(python, "-m", "design", "extended", "implied", *ASKED, "--output", output, cwd=folder)
+        assert (refused.returncode, refused.stderr) == (
+            2,
+            f"Error: implied: no such file, nor can it be one of the thesis's sets, which {folder / name} hides\n",
+        )
 
 
 def test_the_help_imports_no_room() -> None:

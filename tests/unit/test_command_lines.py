@@ -19,6 +19,7 @@ from design.blocks.block import Block
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
 from experiments.__main__ import main as experiments_main
+from experiments.thesis.commands import thesis
 from identification.model.model_file import IdentifiedModel
 
 
@@ -43,6 +44,20 @@ def refused(result: Result, *parts: str) -> None:
     assert "Traceback" not in result.output
     for part in parts:
         assert part in lines[0]
+
+
+@pytest.mark.parametrize("name", sorted(set(thesis.commands) - set(experiments_main.commands)))
+def test_a_command_of_the_print_is_named_where_it_is(runner: CliRunner, name: str) -> None:
+    refused(
+        runner.invoke(experiments_main, [name, "--output", "."]), f"No such command '{name}'; it is now: thesis {name}"
+    )
+
+
+def test_no_other_command_is(runner: CliRunner) -> None:
+    refused(runner.invoke(experiments_main, ["limit"]), "No such command 'limit'")
+    assert (
+        "--refusal FILE stands before the word thesis" in runner.invoke(experiments_main, ["thesis", "--help"]).output
+    )
 
 
 EPSILON = ["--epsilon", "1e-4"]

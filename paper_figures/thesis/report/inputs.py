@@ -11,7 +11,8 @@ from typing import TypeVar
 
 import pandas as pd
 
-from data.thesis import THESIS, model_named
+from data.thesis import THESIS
+from design.asked_model import asked_model
 from design.design_file import Design
 from identification.base.errors import InputError
 from identification.base.files import read_bytes
@@ -123,14 +124,14 @@ def read_inputs(
         return {name: each.replace(f"{build}/", "") if isinstance(each, str) else each for name, each in found.items()}
 
     designs, outcomes = without_path(designs), without_path(outcomes)
-    identified = model_named(model)
+    identified = asked_model(model)
     tests = [alias_free(test, identified.plant) for test in read_sweeps(sweeps)]
     files += dict.fromkeys([*(test.path for test in tests if test.path), *input_files(sweeps)])
     hashes += [(path.name, sha256(read_bytes(path)).hexdigest()) for path in files if path.suffix != KEPT]
     for source in SOURCES:
         if (path := THESIS.parent.parent / source).is_file():
             read(path, source)
-    if model not in ("table", "implied"):
+    if Path(model).is_file():
         read(Path(model), Path(model).name)
     for name in FOLLOWING:
         path = build / f"design_{name}.json"
