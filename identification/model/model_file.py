@@ -79,7 +79,7 @@ class IdentifiedModel:
         return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
 
-def read_model(path: Path) -> IdentifiedModel:
+def read_model(path: Path | str) -> IdentifiedModel:
     """Read a model.json.
 
     Raises
@@ -87,7 +87,7 @@ def read_model(path: Path) -> IdentifiedModel:
     InputError
         No such file, not JSON, another schema, or a number missing or out of range.
     """
-    content = read_json(path, SCHEMA)
+    content = read_json(Path(path), SCHEMA)
     try:
         plant = plant_from_dict(member(content, "plant"))
         bound = bound_from_dict(member(content, "additive_bound"))
