@@ -51,7 +51,7 @@ class IdentifiedModel:
         plant = self.plant
         zeros, poles = len(plant.zero_modes), len(plant.pole_modes)
         return (
-            f"IdentifiedModel(gain {plant.gain:.4g}, {plant.integrators} integrators, {zeros} zero and {poles} pole "
+            f"IdentifiedModel(gain {plant.gain:.4g}, integrators {plant.integrators}, {zeros} zero and {poles} pole "
             f"modes, dead time {plant.delay_s:.4g} s; W_a of order {self.additive_bound.order})"
         )
 
