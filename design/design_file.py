@@ -23,6 +23,8 @@ SCHEMA = 2
 KINDS = ("delay-free", "extended")
 
 Named = TypeVar("Named")
+Asked = str | Compensator | AntiWindup | None
+"""How a caller names an anti-windup, see :meth:`Design.chosen`."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -73,6 +75,10 @@ class Design:
         table = DataFrame({name: asdict(each.judgement) for name, each in self.anti_windup.items()}).T
         return f"<p>{escape(repr(self))}</p>{table.to_html()}"
 
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise InputError(f"kind is {self.kind!r}; expected one of {', '.join(KINDS)}")
+
     @property
     def loop_plant(self) -> PlantModel:
         """The plant as the design sees it: without dead time in chapter 2."""
@@ -93,6 +99,12 @@ class Design:
     def compensator(self, name: str) -> AntiWindup:
         """theta1~ of this name, such as ``thesis`` or ``corrected``; raises InputError when there is none."""
         return _named(self.anti_windup, name).kind
+
+    def chosen(self, asked: Asked) -> AntiWindup | None:
+        """theta1~ as a caller may ask for it: by name, or as it is; ``none`` and None are no anti-windup."""
+        if isinstance(asked, str):
+            return None if asked == "none" else self.compensator(asked)
+        return asked.kind if isinstance(asked, Compensator) else asked
 
     def controller_parts(self) -> tuple[Block, Block]:
         """The blocks of C = forward/(1 - feedback exp(-h s)) with h the plant's dead time, (3.10) and (3.31).
@@ -119,7 +131,7 @@ class Design:
         return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
 
-def read_design(path: Path, kind: str | None = None) -> Design:
+def read_design(path: Path | str, kind: str | None = None) -> Design:
     """Read a design.json.
 
     Parameters
@@ -134,7 +146,7 @@ def read_design(path: Path, kind: str | None = None) -> Design:
     InputError
         No such file, not JSON, another schema or kind, or a member missing or of the wrong form.
     """
-    content = read_json(path, SCHEMA)
+    content = read_json(Path(path), SCHEMA)
     try:
         if content.get("kind") not in KINDS:
             raise InputError(f"kind is {content.get('kind')!r}; expected one of {', '.join(KINDS)}")

@@ -78,7 +78,7 @@ def simulate_command(
     if numbers and anti_windup != "thesis":
         raise InputError(f"--{next(iter(numbers))} belongs to --anti-windup thesis; found --anti-windup {anti_windup}")
     content = read_design(design)
-    kind = None if anti_windup == "none" else content.compensator(anti_windup)
+    kind = content.chosen(anti_windup)
     if numbers:
         thesis = content.thesis
         kind = second_order(**{"alpha": thesis.alpha, "beta": thesis.beta, "gamma": thesis.gamma} | numbers)
@@ -149,7 +149,7 @@ def sampled_command(
     drive = Drive(rate, method, (-limit, limit), quantum, slew, input_delay)
     _require_few_rows(until * rate)
     content = read_design(design)
-    kind = None if anti_windup == "none" else content.compensator(anti_windup)
+    kind = content.chosen(anti_windup)
     asked = reference_of(content, **reference)
     true = None if plant is None else asked_model(plant).plant
     run = simulate_sampled(content, asked, kind, drive, until, true)

@@ -6,7 +6,7 @@
 [FrequencyResponse('synthetic_test_1_frf.csv', 1216 lines, 10.06 to 199.9 Hz, synthetic)]
 >>> model = identification.fit(tests, modes=2, integrators=1)
 >>> model
-IdentifiedModel(gain ..., 1 integrators, 2 zero and 2 pole modes, dead time ... s; W_a of order 2)
+IdentifiedModel(gain ..., integrators 1, 2 zero and 2 pole modes, dead time ... s; W_a of order 2)
 >>> python_control = model.plant.to_control(pade_order=3)
 """
 

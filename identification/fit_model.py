@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import index
 
+from identification.base.errors import InputError
 from identification.bound.bound_residuals import bound_residuals
 from identification.fitting.fit_plant import FitResult, fit_plant
 from identification.fitting.subspace_check import check_modes
@@ -14,6 +16,8 @@ from identification.model.reports import BoundReport, SubspaceCheck
 from identification.model.structure import Wanted
 from identification.output.fit_facts import fit_record, standard_errors
 from identification.sweeps.response import FrequencyResponse, alias_free
+
+MOST_MODES = 8
 
 Tick = Callable[[], object]
 
@@ -75,10 +79,10 @@ def fit_model(
 
 
 def fit(
-    tests: Sequence[FrequencyResponse],
+    tests: FrequencyResponse | Sequence[FrequencyResponse],
     *,
-    modes: int | tuple[int, int] | None = None,
-    real: int | tuple[int, int] | None = None,
+    modes: int | Sequence[int] | None = None,
+    real: int | Sequence[int] | None = None,
     integrators: int | None = None,
     soft: bool = False,
     bound_order: int = 2,
@@ -91,20 +95,36 @@ def fit(
     tests
         One or more responses of the same plant.
     modes, real
-        Zero and pole modes, real zeros and poles: one number for both, or a pair.
+        Zero and pole modes (up to 8 each), real zeros and poles (up to 1 each): one number for both, or a pair.
     integrators
-        Poles at s = 0, up to 2.
+        Poles at s = 0, 0 to 2.
     soft, bound_order, seed
         As for :func:`fit_model`.
 
     Raises
     ------
     InputError
-        See :func:`fit_model`.
+        A number is none of these, or see :func:`fit_model`.
     """
-    pairs = ((count, count) if isinstance(count, int) else count for count in (modes, real))
-    wanted = Wanted(integrators, *pairs)
-    return fit_model(tests, wanted, soft=soft, bound_order=bound_order, seed=seed).model
+    if integrators is not None and integrators not in (0, 1, 2):
+        raise InputError(f"integrators is {integrators!r}; expected 0, 1 or 2")
+    wanted = Wanted(integrators, _pair("modes", modes, MOST_MODES), _pair("real", real, 1))
+    given = [tests] if isinstance(tests, FrequencyResponse) else tests
+    return fit_model(given, wanted, soft=soft, bound_order=bound_order, seed=seed).model
+
+
+def _pair(name: str, count: int | Sequence[int] | None, most: int) -> tuple[int, int] | None:
+    """Numbers of zeros and of poles: of one number twice that; raises InputError when it is none from 0 to ``most``."""
+    if count is None:
+        return None
+    try:
+        zeros, poles = count if isinstance(count, Sequence) and not isinstance(count, str) else (count, count)
+        pair = index(zeros), index(poles)
+    except (TypeError, ValueError):
+        pair = -1, -1
+    if not all(0 <= each <= most for each in pair):
+        raise InputError(f"{name} is {count!r}; expected a number from 0 to {most}, or a pair of zeros and poles")
+    return pair
 
 
 def _checks(tests: Sequence[FrequencyResponse], plants: Sequence[PlantModel], tick: Tick) -> dict[str, SubspaceCheck]:

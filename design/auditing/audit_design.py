@@ -29,7 +29,7 @@ CERTAIN = 1e-9  # of a covered dead time, by which it is told too small
 ROOTS = 5  # rightmost characteristic roots that are named
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Audit:
     """What can be said of a design before anything is simulated.
 
@@ -68,6 +68,13 @@ class Audit:
     anti_windup: dict[str, Judgement]
     robust_sector: dict[str, float]
     least_f: tuple[float, float, float, float]
+
+    def __repr__(self) -> str:
+        if isinstance(self.margins, str):
+            return f"Audit({self.margins})"
+        modulus, robust = self.margins.modulus.value, self.margins.W_a_C_S.value
+        names = ", ".join(self.anti_windup)
+        return f"Audit(modulus margin {modulus:.4g}, |W_a C S| at most {robust:.4g}; anti-windups {names})"
 
 
 def audit(design: Design) -> Audit:

@@ -70,6 +70,8 @@ def design_extended(
         "lagrange": lambda: lagrange(wanted),
         "poles": lambda: by_poles(wanted),
     }
+    if method not in designs:
+        raise InputError(f"the method is '{method}'; expected one of {', '.join(designs)}")
     roll_off = None
     if robust_level is None:
         free = free_part(designs[method](), a)

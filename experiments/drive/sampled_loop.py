@@ -10,10 +10,10 @@ import numpy as np
 from design.anti_windup.compensator import AntiWindup
 from design.blocks.block import Block, plant_block
 from design.blocks.state_space import realize
-from design.design_file import Design
+from design.design_file import Asked, Design
 from experiments.drive.compiled_steps import Actuator, Series, run
 from experiments.drive.difference_equations import METHODS, SampledBlock, sample_block, split
-from experiments.engine.simulate import MOST_STEPS, DivergenceError
+from experiments.engine.simulate import MOST_STEPS, DivergenceError, limit_pair
 from experiments.runs.references import Reference, SampledReference
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
@@ -34,7 +34,7 @@ class Drive:
         How each block of the controller is discretised, ``tustin`` or ``exact``, see
         :func:`experiments.drive.difference_equations.sample_block`.
     limits
-        (sigma_1, sigma_2) of the saturation, sigma_1 < sigma_2, either may be infinite.
+        (sigma_1, sigma_2) of the saturation, sigma_1 < sigma_2, either may be infinite; one number is +- that.
     quantum
         Distance of the actuator's levels, whole multiples of it within the limits; 0 is none.
     slew
@@ -51,7 +51,8 @@ class Drive:
     input_delay_s: float = 0.0
 
     def __post_init__(self) -> None:
-        low, high = self.limits
+        low, high = limit_pair(self.limits)
+        object.__setattr__(self, "limits", (low, high))
         if not 0 < self.rate_hz < math.inf:
             raise InputError(f"the rate is {self.rate_hz:g} Hz; expected a positive number")
         if self.method not in METHODS:
@@ -86,7 +87,7 @@ class Drive:
         return Actuator(float(low), float(high), float(self.quantum), *self.levels, float(self.slew))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SampledRun:
     """A run at the sampling instants t_k = k T_s.
 
@@ -107,6 +108,9 @@ class SampledRun:
     control: np.ndarray
     saturated_control: np.ndarray
 
+    def __repr__(self) -> str:
+        return f"SampledRun({self.time_s.size} samples up to {self.time_s[-1]:.6g} s)"
+
 
 def instants(rate_hz: float, until_s: float) -> np.ndarray:
     """The sampling instants from 0 to ``until_s``."""
@@ -116,7 +120,7 @@ def instants(rate_hz: float, until_s: float) -> np.ndarray:
 def simulate_sampled(
     design: Design,
     reference: Reference | SampledReference,
-    anti_windup: AntiWindup | None,
+    anti_windup: Asked,
     drive: Drive,
     until_s: float,
     plant: PlantModel | None = None,
@@ -159,7 +163,7 @@ def simulate_sampled(
             f"the run lasts {until_s:g} s; expected a finite time of one sample, {1 / drive.rate_hz:g} s, at least"
         )
     series = _series(design.loop_plant if plant is None else plant, drive, until_s)
-    controller = _controller(design, anti_windup, drive)
+    controller = _controller(design, design.chosen(anti_windup), drive)
     time_s = instants(drive.rate_hz, until_s)
     r = reference(time_s)
     y, u, command, start, reached = run(*controller, series, drive.actuator, 1 / drive.rate_hz, r)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -62,6 +62,14 @@ class Run:
             input_labels=["saturated_control"],
             issiso=False,
         )
+
+
+def limit_pair(limits: float | Sequence[float]) -> tuple[float, float]:
+    """The lower and the upper limit: of one number +- that; raises InputError when there are not one or two."""
+    pair = np.atleast_1d(np.asarray(limits, dtype=float))
+    if pair.shape not in ((1,), (2,)):
+        raise InputError(f"the limits are {limits!r}; expected one number, or a lower and an upper one")
+    return (-float(pair[0]), float(pair[0])) if pair.size == 1 else (float(pair[0]), float(pair[1]))
 
 
 class DivergenceError(InputError):

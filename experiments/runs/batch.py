@@ -12,8 +12,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from tqdm import tqdm
 
-from design.anti_windup.compensator import AntiWindup
-from design.design_file import Design
+from design.design_file import Asked, Design
 from experiments.engine.simulate import Run, simulate
 from experiments.runs.design_loop import Controller, plant_loop, realized_controller
 from experiments.runs.references import Reference, SampledReference
@@ -40,7 +39,7 @@ def simulate_many(
     design: Design,
     plants: Iterable[PlantModel],
     references: Sequence[Reference | SampledReference],
-    anti_windups: Mapping[str, AntiWindup | None],
+    anti_windups: Mapping[str, Asked],
     limits: Sequence[float],
     time_s: np.ndarray,
     workers: int | None = None,

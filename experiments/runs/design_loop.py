@@ -7,10 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from design.anti_windup.compensator import AntiWindup
 from design.blocks.block import Block, plant_block
 from design.blocks.state_space import StateSpace, block_diagonal, realize
-from design.design_file import Design
+from design.design_file import Asked, Design
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.runs.references import Generator, Reference, SampledReference
 from identification.base.errors import InputError
@@ -20,7 +19,7 @@ from identification.model.plant import PlantModel
 def design_loop(
     design: Design,
     reference: Reference | SampledReference,
-    anti_windup: AntiWindup | None,
+    anti_windup: Asked,
     plant: PlantModel | None = None,
 ) -> SaturatedLoop:
     """The loop of Fig. 2.6 around a design, from rest, which obeys Thesis Lemma 2 and its steps, Eq. (2.10)-(2.15).
@@ -32,7 +31,7 @@ def design_loop(
     reference
         r(t).
     anti_windup
-        theta1~ with 1 + theta1~; None takes theta1 and theta2 out of the loop.
+        theta1~ with 1 + theta1~, or its name in the design; None takes theta1 and theta2 out of the loop.
     plant
         The true plant, with at least one pole more than zeros; the design's own model unless given. The controller
         keeps the model in F, K and theta2, dead time and all.
@@ -82,14 +81,13 @@ class Controller:
     delay_s: float
 
 
-def realized_controller(design: Design, anti_windup: AntiWindup | None) -> Controller:
+def realized_controller(design: Design, anti_windup: Asked) -> Controller:
     """What :func:`design_loop` has besides the plant and the reference."""
+    kind = design.chosen(anti_windup)
     model = design.loop_plant
     forward, feedback = (realize(block) for block in design.controller_parts())
-    if anti_windup is None:
-        theta = realize(Block(0.0), Block(0.0))
-    else:
-        theta = realize(anti_windup.theta1_tilde, anti_windup.theta2(model))
+    blocks = (Block(0.0), Block(0.0)) if kind is None else (kind.theta1_tilde, kind.theta2(model))
+    theta = realize(*blocks)
     return Controller(forward, feedback, theta, model.delay_s)
 
 

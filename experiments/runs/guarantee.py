@@ -13,7 +13,7 @@ from design.anti_windup.circle_criterion import circle_sector
 from design.anti_windup.compensator import AntiWindup
 from design.blocks.block import bound_block, plant_block
 from design.blocks.frequency_peak import frequency_grid
-from design.design_file import Design
+from design.design_file import Asked, Design
 from design.stability.margins import delay_loop, margins_of, responses
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
@@ -38,21 +38,24 @@ class Guarantee:
     missing: str = ""
 
 
-def guarantee(design: Design, anti_windup: AntiWindup, plant: PlantModel | None = None) -> Guarantee:
+def guarantee(design: Design, anti_windup: Asked, plant: PlantModel | None = None) -> Guarantee:
     """What a design promises of its runs under a reference.
 
     Parameters
     ----------
     design, anti_windup
-        The design and its theta1~.
+        The design and its theta1~, or the name of that; without one nothing is promised.
     plant
         The true plant, the model unless given. Another one is covered only as one of all plants within W_a.
     """
+    kind = design.chosen(anti_windup)
+    if kind is None:
+        return Guarantee(0.0, "there is no anti-windup")
     if plant is None or plant == design.loop_plant:
-        return _without_theta2(design, anti_windup) or Guarantee(circle_sector(anti_windup.theta1_tilde))
+        return _without_theta2(design, kind) or Guarantee(circle_sector(kind.theta1_tilde))
     if not _is_within(design, plant):
         return Guarantee(0.0, "the true plant is not within W_a of the design's model")
-    return guarantee_within(design, anti_windup)
+    return guarantee_within(design, kind)
 
 
 def guarantee_within(design: Design, anti_windup: AntiWindup) -> Guarantee:

@@ -141,6 +141,8 @@ class SampledReference:
     values: np.ndarray
 
     def __post_init__(self) -> None:
+        for name in ("time_s", "values"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=float))
         if not (self.time_s.shape == self.values.shape and self.time_s.ndim == 1 and len(self.time_s) > 0):
             raise InputError(
                 f"the sampled reference has shapes {self.time_s.shape} and {self.values.shape}; expected as many times "
@@ -172,6 +174,6 @@ class SampledReference:
         return Generator(matrix, row, pieces[0], Resets(knots[1:], pieces[1:]))
 
 
-def sinusoid(amplitude: float, omega: float, phase_rad: float, offset: float) -> Reference:
+def sinusoid(amplitude: float, omega: float, phase_rad: float = 0.0, offset: float = 0.0) -> Reference:
     """r(t) = amplitude sin(omega t + phase_rad) + offset, omega in rad/s."""
     return Reference((amplitude,), (omega,), (phase_rad,), offset)

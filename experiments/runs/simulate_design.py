@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from design.anti_windup.compensator import AntiWindup
-from design.design_file import Design
-from experiments.engine.simulate import Run, simulate
+from design.design_file import Asked, Design
+from experiments.engine.simulate import Run, limit_pair, simulate
 from experiments.runs.compare_anti_windups import span
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference, SampledReference
@@ -19,9 +20,9 @@ SAMPLES = 5001
 
 def simulate_design(
     design: Design,
-    limits: float | tuple[float, float],
+    limits: float | Sequence[float],
     reference: Reference | SampledReference,
-    anti_windup: str | AntiWindup | None = "corrected",
+    anti_windup: Asked = "corrected",
     *,
     until_s: float | None = None,
     samples: int = SAMPLES,
@@ -60,9 +61,8 @@ def simulate_design(
     """
     if samples < 2:
         raise InputError(f"{samples} samples are asked for; expected two or more")
-    if isinstance(anti_windup, str):
-        anti_windup = None if anti_windup == "none" else design.compensator(anti_windup)
     if until_s is None:
         until_s = PERIODS * span(design, reference) if isinstance(reference, Reference) else reference.time_s[-1]
-    low, high = limits if isinstance(limits, tuple) else (-limits, limits)
-    return simulate(design_loop(design, reference, anti_windup, plant), (low, high), np.linspace(0.0, until_s, samples))
+    return simulate(
+        design_loop(design, reference, anti_windup, plant), limit_pair(limits), np.linspace(0.0, until_s, samples)
+    )

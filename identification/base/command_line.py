@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import gc
+import os
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from identification.base.errors import InputError, MissingFile
 from identification.base.files import write_whole
 
+KEPT = ".refused.txt"  # how the name of a kept refusal ends
 EXTRAS = {"dask": "campaign", "distributed": "campaign", "pyarrow": "campaign"}  # of pyproject.toml, by their modules
 
 
@@ -29,8 +31,8 @@ class CommandGroup(click.Group):
     array larger than the memory; and where a module of an extra is not installed.
 
     With ``--refusal FILE``, for a chain of commands that goes on without the one that refuses, the exit status is 0
-    and the sentence stands in FILE too. A command that lacks an input, which one before it refused to write, then does
-    nothing, and writes nothing.
+    and the sentence stands in FILE too, whose name ends in .refused.txt. A command that lacks an input, which one
+    before it refused to write, then does nothing, and writes nothing.
     """
 
     def __init__(self, *arguments: Any, **attributes: Any) -> None:
@@ -44,6 +46,7 @@ class CommandGroup(click.Group):
         atexit.register(gc.freeze)  # without it the interpreter sweeps all modules as it ends: a third of a second
         refusal: Path | None = ctx.params.pop("refusal")
         if refusal is not None:
+            _require_ours(refusal)
             _keep(refusal, None)
         try:
             with np.errstate(over="raise"):
@@ -63,6 +66,16 @@ class CommandGroup(click.Group):
             return click.echo(f"{sentence}; nothing is done", err=True)
         Refusal(sentence).show()
         return _keep(refusal, sentence)
+
+
+def _require_ours(refusal: Path) -> None:
+    """Refuse a FILE that could be anything but the sentence of an earlier refusal, since it is removed."""
+    if not refusal.name.endswith(KEPT):
+        raise Refusal(f"--refusal is '{refusal}'; expected a name that ends in {KEPT}")
+    if refusal.is_symlink() or (refusal.exists() and not refusal.is_file()):
+        raise Refusal(f"{refusal}: is no regular file; expected a file that holds a refusal, or none")
+    if not os.access(refusal.parent, os.W_OK):
+        raise Refusal(f"{refusal}: cannot be written; expected a folder that exists and may be written to")
 
 
 def _keep(refusal: Path, sentence: str | None) -> None:

@@ -51,7 +51,7 @@ class IdentifiedModel:
         plant = self.plant
         zeros, poles = len(plant.zero_modes), len(plant.pole_modes)
         return (
-            f"IdentifiedModel(gain {plant.gain:.4g}, {plant.integrators} integrators, {zeros} zero and {poles} pole "
+            f"IdentifiedModel(gain {plant.gain:.4g}, integrators {plant.integrators}, {zeros} zero and {poles} pole "
             f"modes, dead time {plant.delay_s:.4g} s; W_a of order {self.additive_bound.order})"
         )
 
@@ -79,7 +79,7 @@ class IdentifiedModel:
         return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
 
-def read_model(path: Path) -> IdentifiedModel:
+def read_model(path: Path | str) -> IdentifiedModel:
     """Read a model.json.
 
     Raises
@@ -87,7 +87,7 @@ def read_model(path: Path) -> IdentifiedModel:
     InputError
         No such file, not JSON, another schema, or a number missing or out of range.
     """
-    content = read_json(path, SCHEMA)
+    content = read_json(Path(path), SCHEMA)
     try:
         plant = plant_from_dict(member(content, "plant"))
         bound = bound_from_dict(member(content, "additive_bound"))

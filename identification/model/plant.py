@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,18 +14,20 @@ from numpy.typing import ArrayLike
 from identification.base.arrays import Complex
 from identification.base.errors import InputError
 from identification.model.parameter import Parameter
-from identification.model.python_control import from_control, to_control
+from identification.model.python_control import from_control, lowest, to_control
 
 if TYPE_CHECKING:
     from control import TransferFunction
 
+NEAR_ZERO = 1e-7
+"""Of the fastest root's modulus, within which a pole may be at s = 0 but for rounding."""
 HIGHEST_ORDER = 8
 """Most poles of an additive bound that is fitted."""
 
 
 def _finite(**numbers: float) -> None:
     for name, number in numbers.items():
-        if not (isinstance(number, int | float) and math.isfinite(number)):
+        if isinstance(number, bool | np.bool_) or not (isinstance(number, Real) and math.isfinite(number)):
             raise InputError(f"{name} is {number!r}; expected a finite real number")
 
 
@@ -52,6 +55,8 @@ class Mode:
 
     def __post_init__(self) -> None:
         _positive(omega=self.omega, zeta=self.zeta)
+        for name in ("omega", "zeta"):
+            object.__setattr__(self, name, float(getattr(self, name)))
 
     def __call__(self, s: ArrayLike) -> Complex:
         """Evaluate the factor at complex frequencies ``s`` (any shape, rad/s)."""
@@ -103,6 +108,8 @@ class PlantModel:
 
     def __post_init__(self) -> None:
         _finite(gain=self.gain, delay_s=self.delay_s)
+        for name in ("gain", "delay_s"):
+            object.__setattr__(self, name, float(getattr(self, name)))
         if self.gain == 0:
             raise InputError("the plant's gain is 0; expected any other number")
         if self.delay_s < 0:
@@ -144,24 +151,32 @@ class PlantModel:
 
     def to_control(self, pade_order: int = 0) -> TransferFunction:
         """P(s) as python-control's transfer function, see :func:`identification.model.python_control.to_control`."""
-        gain, zeros, poles = _leading(self.gain, self.zero_modes, self.real_zeros, self.pole_modes, self.real_poles)
-        poles += [0j] * self.integrators
-        return to_control(gain, zeros, poles, self.delay_s, pade_order, "P")
+        zeros, poles = _roots(self.zero_modes, self.real_zeros), _roots(self.pole_modes, self.real_poles)
+        return to_control(self.gain, zeros, poles, self.integrators, self.delay_s, pade_order, "P")
 
     @classmethod
-    def from_control(cls, system: object, delay_s: float = 0.0) -> PlantModel:
+    def from_control(cls, system: object, delay_s: float = 0.0, integrators: int | None = None) -> PlantModel:
         """The plant of a python-control system and a dead time in seconds.
+
+        ``integrators`` says how many of the slowest poles are at s = 0; unless given, those that are there exactly.
 
         Raises
         ------
         InputError
-            See :func:`identification.model.python_control.from_control`; or a root lies right of the imaginary axis,
-            or on it but for poles at s = 0.
+            See :func:`identification.model.python_control.from_control`; a root lies right of the imaginary axis, or
+            on it but for poles at s = 0; or rounding hides whether a pole is at s = 0, see :data:`NEAR_ZERO`.
         """
-        gain, zeros, poles = from_control(system)
-        left = [pole for pole in poles if pole]
-        K, zero_modes, real_zeros, pole_modes, real_poles = _lowest(gain, zeros, left)
-        return cls(K, zero_modes, pole_modes, delay_s, len(poles) - len(left), real_zeros, real_poles)
+        gain, zeros, found = from_control(system)
+        poles = sorted(found, key=abs)
+        count = sum(not pole for pole in poles) if integrators is None else integrators
+        left = poles[count:]
+        if integrators is None and left and abs(left[0]) < NEAR_ZERO * max(map(abs, (*poles, *zeros))):
+            raise InputError(
+                f"a pole is at {left[0]:.3g} rad/s, which rounding does not tell from 0; expected integrators to say "
+                "how many there are"
+            )
+        (zero_modes, real_zeros), (pole_modes, real_poles) = _factors(zeros), _factors(left)
+        return cls(lowest(gain, zeros, left), zero_modes, pole_modes, delay_s, count, real_zeros, real_poles)
 
 
 @dataclass(frozen=True)
@@ -237,41 +252,27 @@ class AdditiveBound:
 
     def to_control(self) -> TransferFunction:
         """W_a(s) as python-control's transfer function."""
-        return to_control(
-            *_leading(self.gain, self.zero_modes, self.real_zeros, self.pole_modes, self.real_poles), 0.0, 0, "W_a"
-        )
+        zeros, poles = _roots(self.zero_modes, self.real_zeros), _roots(self.pole_modes, self.real_poles)
+        return to_control(self.gain, zeros, poles, 0, 0.0, 0, "W_a")
 
     @classmethod
     def from_control(cls, system: object) -> AdditiveBound:
         """The bound |system|; raises InputError when it is not stable, minimum phase and as above."""
-        gain, zero_modes, real_zeros, pole_modes, real_poles = _lowest(*from_control(system))
-        return cls(abs(gain), zero_modes, pole_modes, real_zeros, real_poles)
+        gain, zeros, poles = from_control(system)
+        (zero_modes, real_zeros), (pole_modes, real_poles) = _factors(zeros), _factors(poles)
+        return cls(abs(lowest(gain, zeros, poles)), zero_modes, pole_modes, real_zeros, real_poles)
 
 
-def _leading(
-    gain: float,
-    zero_modes: tuple[Mode, ...],
-    real_zeros: tuple[float, ...],
-    pole_modes: tuple[Mode, ...],
-    real_poles: tuple[float, ...],
-) -> tuple[float, list[complex], list[complex]]:
-    """Leading coefficient, zeros and poles in rad/s of gain * prod(zeros)/prod(poles), each factor 1 at s = 0."""
-    zeros = [*(root for mode in zero_modes for root in mode.roots), *(complex(-rate) for rate in real_zeros)]
-    poles = [*(root for mode in pole_modes for root in mode.roots), *(complex(-rate) for rate in real_poles)]
-    return float((gain * np.prod(np.negative(poles)) / np.prod(np.negative(zeros))).real), zeros, poles
+def _roots(modes: tuple[Mode, ...], rates: tuple[float, ...]) -> list[complex]:
+    """The roots in rad/s of a product of modes and factors 1 + s/rate."""
+    return [*(root for mode in modes for root in mode.roots), *(complex(-rate) for rate in rates)]
 
 
-def _lowest(
-    gain: float, zeros: Sequence[complex], poles: Sequence[complex]
-) -> tuple[float, tuple[Mode, ...], tuple[float, ...], tuple[Mode, ...], tuple[float, ...]]:
-    """What :func:`_leading` takes from what it returns; pairs and rates in the order of their frequencies."""
-    low = float((gain * np.prod(np.negative(zeros)) / np.prod(np.negative(poles))).real)
-    modes, rates = [], []
-    for roots in (zeros, poles):
-        pairs = sorted((root for root in roots if root.imag > 0), key=abs)
-        modes.append(tuple(Mode(abs(root), -root.real / abs(root)) for root in pairs))
-        rates.append(tuple(sorted(-root.real for root in roots if root.imag == 0)))
-    return low, modes[0], rates[0], modes[1], rates[1]
+def _factors(roots: Sequence[complex]) -> tuple[tuple[Mode, ...], tuple[float, ...]]:
+    """What :func:`_roots` takes from what it returns, each kind in the order of its frequencies."""
+    pairs = sorted((root for root in roots if root.imag > 0), key=abs)
+    modes = tuple(Mode(abs(root), -root.real / abs(root)) for root in pairs)
+    return modes, tuple(sorted(-root.real for root in roots if root.imag == 0))
 
 
 def _positive_rates(**rates: tuple[float, ...]) -> None:

@@ -7,10 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from identification.base.arrays import Real
 from identification.base.errors import InputError
 
 if TYPE_CHECKING:
     from control import TransferFunction
+
+ROUNDING = 1e-10
+"""Of what norms allow, below which a Markov parameter is taken for 0."""
 
 
 class Roots(NamedTuple):
@@ -21,15 +25,26 @@ class Roots(NamedTuple):
     poles: tuple[complex, ...]
 
 
+def lowest(gain: float, zeros: Sequence[complex], poles: Sequence[complex]) -> float:
+    """The factor before prod(1 - s/zero)/prod(1 - s/pole), of the leading coefficient ``gain``; no root is 0."""
+    return float((gain * np.prod(np.negative(zeros)) / np.prod(np.negative(poles))).real)
+
+
 def to_control(
-    gain: float, zeros: Sequence[complex], poles: Sequence[complex], delay_s: float, pade_order: int, name: str
+    gain: float,
+    zeros: Sequence[complex],
+    poles: Sequence[complex],
+    integrators: int,
+    delay_s: float,
+    pade_order: int,
+    name: str,
 ) -> TransferFunction:
-    """gain * prod(s - zero)/prod(s - pole) * exp(-delay_s s) as python-control's transfer function.
+    """gain/s^integrators * prod(1 - s/zero)/prod(1 - s/pole) * exp(-delay_s s) as python-control's transfer function.
 
     Parameters
     ----------
-    gain, zeros, poles
-        Real leading coefficient; roots in rad/s.
+    gain, zeros, poles, integrators
+        Roots in rad/s, none of them 0; poles at s = 0 are integrators.
     delay_s
         Dead time in seconds, which python-control has no exact form for.
     pade_order
@@ -43,6 +58,14 @@ def to_control(
     InputError
         The order is negative.
     """
+    leading = lowest(gain, poles, zeros)
+    return leading_to_control(leading, zeros, [*poles, *[0j] * integrators], delay_s, pade_order, name)
+
+
+def leading_to_control(
+    gain: float, zeros: Sequence[complex], poles: Sequence[complex], delay_s: float, pade_order: int, name: str
+) -> TransferFunction:
+    """The same of gain * prod(s - zero)/prod(s - pole)."""
     import control
 
     if pade_order < 0:
@@ -59,6 +82,9 @@ def to_control(
 def from_control(system: object) -> Roots:
     """The gain and the roots of a python-control system: continuous, one input and one output.
 
+    Of a state space the poles are the eigenvalues of A, the relative degree that of the first Markov parameter that
+    rounding does not explain, and the zeros as many of the system pencil's as that leaves, those of least size.
+
     Raises
     ------
     InputError
@@ -66,18 +92,34 @@ def from_control(system: object) -> Roots:
     """
     import control
 
-    try:
-        rational = control.tf(system)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{type(system).__name__} is no transfer function ({error})") from None
-    if not rational.issiso():
-        raise InputError(
-            f"the system has {rational.ninputs} inputs and {rational.noutputs} outputs; expected one of each"
-        )
-    if rational.isdtime(strict=True):
-        raise InputError(f"the system is of discrete time, dt = {rational.dt}; expected continuous time")
-    numerator, denominator = (np.trim_zeros(part[0][0], "f") for part in (rational.num, rational.den))
+    if not isinstance(system, control.StateSpace | control.TransferFunction):
+        raise InputError(f"{type(system).__name__} is no transfer function or state space")
+    if not system.issiso():
+        raise InputError(f"the system has {system.ninputs} inputs and {system.noutputs} outputs; expected one of each")
+    if system.isdtime(strict=True):
+        raise InputError(f"the system is of discrete time, dt = {system.dt}; expected continuous time")
+    if isinstance(system, control.StateSpace):
+        return _roots_of_state_space(system.A, system.B[:, 0], system.C[0], float(system.D[0, 0]))
+    numerator, denominator = (np.trim_zeros(part[0][0], "f") for part in (system.num, system.den))
     if not (np.isfinite([*numerator, *denominator]).all() and numerator.size):
         raise InputError("the system's transfer function is 0 or not finite; expected finite numbers")
     zeros, poles = (tuple(complex(root) for root in np.roots(part)) for part in (numerator, denominator))
     return Roots(float(numerator[0] / denominator[0]), zeros, poles)
+
+
+def _roots_of_state_space(A: Real, b: Real, c: Real, d: float) -> Roots:
+    from scipy.linalg import eigvals
+
+    n, size = len(b), max(1e-300, float(np.linalg.norm(A, 2))) if len(b) else 1.0
+    if not np.isfinite([*A.ravel(), *b, *c, d]).all():
+        raise InputError("the state space is not finite; expected finite numbers")
+    markov, least, vector = d, ROUNDING * float(np.linalg.norm(b) * np.linalg.norm(c)) / size, b
+    degree = 0
+    while degree <= n and abs(markov) <= least:
+        degree, markov, least, vector = degree + 1, float(c @ vector), least * size, A @ vector
+    if degree > n:
+        raise InputError("the system's transfer function is 0; expected a system that responds")
+    pencil = np.block([[A, b[:, None]], [c[None, :], np.array([[d]])]])
+    found = eigvals(pencil, np.diag([1.0] * n + [0.0]))
+    zeros = sorted(found[np.isfinite(found)], key=abs)[: n - degree]
+    return Roots(markov, tuple(complex(z) for z in zeros), tuple(complex(p) for p in np.linalg.eigvals(A)))

@@ -15,9 +15,10 @@ from identification.formats.mat_file import read_mat
 from identification.formats.uff_file import read_uff
 from identification.sweeps.estimate_response import estimate_response
 from identification.sweeps.kept_responses import read_responses
-from identification.sweeps.response import FEWEST_LINES, FrequencyResponse, Record
+from identification.sweeps.response import FrequencyResponse, Record
 from identification.sweeps.swapped_or_wrong_unit import bends, lead_time, wrap
 
+FEWEST_LINES = 8
 FEWEST_SAMPLES = 128
 JITTER = 0.05  # largest distance of a sample from the uniform grid, in sampling intervals
 CONSTANT = 1e-9  # of a signal's size
@@ -48,8 +49,8 @@ def input_files(paths: Sequence[Path | str]) -> list[Path]:
     return files
 
 
-def read_sweeps(paths: Sequence[Path | str]) -> list[FrequencyResponse]:
-    """Read the tests of files and folders (see :func:`input_files`), in their order.
+def read_sweeps(paths: Path | str | Sequence[Path | str]) -> list[FrequencyResponse]:
+    """Read the tests of a file, or of files and folders (see :func:`input_files`), in their order.
 
     A file that ends in .npz holds responses that were estimated before, see
     :mod:`identification.sweeps.kept_responses`; they keep their names and the paths that they came from. Every other
@@ -66,7 +67,7 @@ def read_sweeps(paths: Sequence[Path | str]) -> list[FrequencyResponse]:
         A file cannot be read, lacks a column, or holds numbers that cannot be a sweep's; the sentence names
         the file, the line, the test, what was found and what was expected.
     """
-    files = input_files(paths)
+    files = input_files([paths] if isinstance(paths, Path | str) else paths)
     tests = []
     for file, name in zip(files, _names(files), strict=True):
         if file.suffix.lower() == KEPT:

@@ -16,8 +16,6 @@ from identification.model.pulse_response import aliases
 if TYPE_CHECKING:
     from control import FrequencyResponseData
 
-FEWEST_LINES = 8
-
 
 @dataclass(frozen=True, repr=False)
 class Record:
@@ -51,7 +49,7 @@ class FrequencyResponse:
     Parameters
     ----------
     omega
-        (M,) rad/s, positive, increasing.
+        (M,) rad/s, positive, increasing; else InputError.
     response
         (M,) complex, output unit per input unit.
     coherence
@@ -78,16 +76,30 @@ class FrequencyResponse:
     record: Record | None = None
     path: Path | None = None
 
+    def __post_init__(self) -> None:
+        omega, response = np.asarray(self.omega, dtype=float), np.asarray(self.response, dtype=complex)
+        object.__setattr__(self, "omega", omega)
+        object.__setattr__(self, "response", response)
+        if not (omega.ndim == 1 and omega.shape == response.shape and omega.size):
+            raise InputError(
+                f"{self.name}: omega and response have the shapes {omega.shape} and {response.shape}; expected as many "
+                "frequencies as values, and one at least"
+            )
+        if not (np.isfinite(omega).all() and np.isfinite(response).all()):
+            raise InputError(f"{self.name}: omega or response is not finite; expected finite numbers")
+        if omega[0] <= 0 or np.any(np.diff(omega) <= 0):
+            raise InputError(f"{self.name}: omega is not positive and increasing; expected that, without duplicates")
+
     def __repr__(self) -> str:
         low, high = self.omega[[0, -1]] / (2 * np.pi)
         synthetic = ", synthetic" if self.synthetic else ""
         return f"FrequencyResponse('{self.name}', {self.omega.size} lines, {low:.4g} to {high:.4g} Hz{synthetic})"
 
     def to_control(self) -> FrequencyResponseData:
-        """The response as python-control's frequency response data."""
+        """The response as python-control's frequency response data; its names hold no dots."""
         from control import FrequencyResponseData
 
-        return FrequencyResponseData(self.response, self.omega, name=self.name)
+        return FrequencyResponseData(self.response, self.omega, name=self.name.replace(".", "_"))
 
     @classmethod
     def from_control(cls, data: FrequencyResponseData) -> FrequencyResponse:
@@ -96,19 +108,11 @@ class FrequencyResponse:
         Raises
         ------
         InputError
-            More than one input or output, fewer than 8 frequencies, a frequency that is not positive or not greater
-            than the one before it, or a number that is not finite.
+            More than one input or output, or frequencies or values that are none of a test.
         """
         if not data.issiso():
             raise InputError(f"the data have {data.ninputs} inputs and {data.noutputs} outputs; expected one of each")
-        omega, response = np.array(data.omega, dtype=float), np.array(data.frdata[0, 0], dtype=complex)
-        if not (np.isfinite(omega).all() and np.isfinite(response).all()):
-            raise InputError("the data are not finite; expected finite frequencies and responses")
-        if len(omega) < FEWEST_LINES or omega[0] <= 0 or np.any(np.diff(omega) <= 0):
-            raise InputError(
-                f"the data have {len(omega)} frequencies; expected {FEWEST_LINES} or more, positive and increasing"
-            )
-        return cls(omega, response, None, data.name)
+        return cls(data.omega, data.frdata[0, 0], None, data.name)
 
 
 def alias_free(test: FrequencyResponse, plant: PlantModel) -> FrequencyResponse:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullFormatter
 
 from identification.base.arrays import Real
+from identification.base.errors import InputError
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, PlantModel
 from identification.sweeps.response import FrequencyResponse, alias_free
@@ -56,6 +57,8 @@ def plot_bode(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> Fig
     Figure
         Three panels, a to c, over omega in rad/s. The title says so if a test is synthetic.
     """
+    if not tests:
+        raise InputError("no test was given; expected one or more responses")
     plant, bound = model.plant, model.additive_bound
     clean = [alias_free(test, plant) for test in tests]
     figure = Figure(figsize=(5.2, 6.2), layout="constrained")

@@ -46,9 +46,21 @@ def test_a_bound_and_a_block_go_there_and_back() -> None:
     np.testing.assert_allclose(Block.from_control(block.to_control(), 0.5)(1j * OMEGA), block(1j * OMEGA), rtol=1e-9)
 
 
-def test_state_spaces_are_taken_too() -> None:
-    system = control.ss([[-2.0, 1.0], [0.0, -5.0]], [[0.0], [1.0]], [[3.0, 0.0]], 0.0)
-    np.testing.assert_allclose(PlantModel.from_control(system)(1j * OMEGA), system(1j * OMEGA), rtol=1e-9)
+@pytest.mark.parametrize("seed", range(20))
+def test_state_spaces_in_any_coordinates_keep_their_integrator(seed: int) -> None:
+    """1/s + 1/(s + 1) + 1/(s + 3): rounding moves the pole at 0, which is said and not taken for another plant."""
+    A, b, c = np.diag([0.0, -1.0, -3.0]), np.ones((3, 1)), np.ones((1, 3))
+    T = np.random.default_rng(seed).standard_normal((3, 3))
+    system = control.ss(np.linalg.solve(T, A @ T), np.linalg.solve(T, b), c @ T, 0.0)
+    expected = control.ss(A, b, c, 0.0)(1j * OMEGA)
+    found = PlantModel.from_control(system, integrators=1)
+    assert (found.integrators, len(found.real_zeros) + 2 * len(found.zero_modes)) == (1, 2)
+    np.testing.assert_allclose(found(1j * OMEGA), expected, rtol=1e-6)
+    try:
+        said = str(PlantModel.from_control(system).integrators)
+    except InputError as error:
+        said = str(error)
+    assert said == "1" or said.endswith("expected integrators to say how many there are")
 
 
 @pytest.mark.parametrize(
@@ -74,8 +86,15 @@ def test_a_response_goes_there_and_back() -> None:
     back = FrequencyResponse.from_control(data)
     np.testing.assert_array_equal(back.response, test.response)
     assert back.name == "mine"
-    with pytest.raises(InputError, match="3 frequencies; expected 8"):
-        FrequencyResponse.from_control(control.frd(test.response[:3], OMEGA[:3]))
+    assert replace(test, name="sweep.csv").to_control().name == "sweep_csv"
+    for omega, response, said in (
+        (OMEGA[::-1], test.response, "increasing"),
+        (OMEGA, test.response[:3], "shapes"),
+        (OMEGA, np.nan * test.response, "not finite"),
+        ([], [], "one at least"),
+    ):
+        with pytest.raises(InputError, match=said):
+            FrequencyResponse(omega, response, None, "mine")
 
 
 def test_a_run_is_a_time_response(extended_design: Design) -> None:

@@ -84,15 +84,30 @@ def test_a_crash_and_a_wrong_option_are_no_refusals(tmp_path: Path) -> None:
 
 
 def test_a_refusal_that_cannot_be_kept_is_one(tmp_path: Path) -> None:
-    result = CliRunner().invoke(group, ["--refusal", str(tmp_path / "nowhere" / "r.txt"), "end", "refused"])
-    assert result.exit_code == 2
-    assert "cannot be written" in result.stderr
+    for how in ("refused", "well"):
+        result = CliRunner().invoke(group, ["--refusal", str(tmp_path / "nowhere" / "r.refused.txt"), "end", how])
+        assert result.exit_code == 2
+        assert "cannot be written" in result.stderr
+
+
+def test_nothing_but_a_refusal_is_removed(tmp_path: Path) -> None:
+    """Not an input, an output, a link nor a device that was given by mistake."""
+    design, link, folder = tmp_path / "design.json", tmp_path / "a.refused.txt", tmp_path / "b.refused.txt"
+    design.write_text("{}", encoding="utf-8")
+    link.symlink_to(design)
+    folder.mkdir()
+    for given in (design, link, folder, Path("/dev/null"), Path()):
+        result = CliRunner().invoke(group, ["--refusal", str(given), "end", "well"])
+        assert result.exit_code == 2, given
+    assert design.read_text(encoding="utf-8") == "{}"
+    assert link.is_symlink()
+    assert Path("/dev/null").is_char_device()
 
 
 def test_the_commands_of_make_pass_over_what_was_not_made(tmp_path: Path) -> None:
     chosen = ["--period", "4", "--epsilon", "1e-4", "--output", str(tmp_path / "design.json")]
     drawn = ["fig_2_10", "--results", str(tmp_path), "--output", str(tmp_path)]
-    refusal = ["--refusal", str(tmp_path / "refused.txt")]
+    refusal = ["--refusal", str(tmp_path / "command.refused.txt")]
     for main, arguments in (
         (design, ["delay-free", str(tmp_path / "model.json"), *chosen]),
         (paper_figures, ["draw", *drawn]),
