@@ -63,29 +63,31 @@ def plot_bode(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> Fig
     clean = [alias_free(test, plant) for test in tests]
     figure = Figure(figsize=(5.2, 6.2), layout="constrained")
     magnitude, phase, distance = figure.subplots(3, 1, sharex=True)
-    draw_magnitude(magnitude, clean, plant)
-    draw_phase(phase, clean, plant)
+    kinds = {"synthetic" if test.synthetic else "measured" for test in tests}
+    name = " and ".join(sorted(kinds))
+    draw_magnitude(magnitude, clean, plant, name)
+    draw_phase(phase, clean, plant, name)
     draw_distance(distance, clean, plant, bound)
     for panel, letter in zip((magnitude, phase, distance), "abc", strict=True):
         panel.grid(which="both", linewidth=0.3, color="0.85")
         panel.legend(loc="lower left", markerscale=4)
         panel.text(0.985, 0.95, f"({letter})", transform=panel.transAxes, ha="right", va="top")
-    if any(test.synthetic for test in tests):
-        figure.suptitle("synthetic data, not measured", fontsize="medium")
+    if "synthetic" in kinds:
+        figure.suptitle("synthetic data, never measured" if len(kinds) == 1 else "some data are synthetic")
     figure.align_ylabels()
     distance.set_xlabel(r"$\omega$ [rad/s]")
     return figure
 
 
-def draw_magnitude(panel: Axes, tests: Sequence[FrequencyResponse], plant: PlantModel) -> None:
-    """Draw the magnitude in dB of the tests and, upon them, of the model."""
+def draw_magnitude(panel: Axes, tests: Sequence[FrequencyResponse], plant: PlantModel, name: str = "measured") -> None:
+    """Draw the magnitude in dB of the tests, so named, and, upon them, of the model."""
     omega = _grid(panel, tests)
-    _scatter(panel, tests, [decibel(np.abs(test.response)) for test in tests], "measured")
+    _scatter(panel, tests, [decibel(np.abs(test.response)) for test in tests], name)
     panel.plot(omega, decibel(np.abs(plant(1j * omega))), **MODEL, label="model")
     panel.set_ylabel("Magnitude [dB]")
 
 
-def draw_phase(panel: Axes, tests: Sequence[FrequencyResponse], plant: PlantModel) -> None:
+def draw_phase(panel: Axes, tests: Sequence[FrequencyResponse], plant: PlantModel, name: str = "measured") -> None:
     """Draw the phase in degrees of the model, unwrapped, and, behind it, of the tests on the turn next to it."""
     omega = _grid(panel, tests)
     rational_rad = np.unwrap(np.angle(plant.without_delay()(1j * omega)))
@@ -95,7 +97,7 @@ def draw_phase(panel: Axes, tests: Sequence[FrequencyResponse], plant: PlantMode
         np.round((np.interp(test.omega, omega, phase_deg) - measured) / 360)
         for test, measured in zip(tests, measured_deg, strict=True)
     ]
-    _scatter(panel, tests, [a + 360 * n for a, n in zip(measured_deg, turns, strict=True)], "measured")
+    _scatter(panel, tests, [a + 360 * n for a, n in zip(measured_deg, turns, strict=True)], name)
     panel.plot(omega, phase_deg, **MODEL, label="model")
     low, high = panel.get_ylim()
     enough = [step for step in TURNS_DEG if (high - low) / step <= MOST_TICKS]

@@ -41,11 +41,11 @@ def test_fit_has_three_panels_with_tests_behind_the_model() -> None:
     figure = plot_bode(MODEL, [SWEEP, replace(SWEEP, synthetic=True)])
     assert [len(panel.lines) for panel in figure.axes] == [3, 3, 3]
     assert [panel.get_ylabel() for panel in figure.axes] == ["Magnitude [dB]", "Phase [deg]", "Distance [dB]"]
-    assert figure.get_suptitle() == "synthetic data, not measured"
+    assert figure.get_suptitle() == "some data are synthetic"
     for line in figure.axes[0].lines[:2]:
         assert line.get_ydata() == pytest.approx(decibel(np.abs(SWEEP.response)))
     keys = [[text.get_text() for text in panel.get_legend().get_texts()] for panel in figure.axes]
-    assert keys[:2] == [["measured", "model"]] * 2
+    assert keys[:2] == [["measured and synthetic", "model"]] * 2
 
 
 def test_distance_has_the_bound_above_and_rings_where_it_touches(panel: Axes) -> None:
