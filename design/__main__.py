@@ -6,7 +6,6 @@ Each command imports what it runs, so that a command line answers at once, and m
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING
 import click
 
 from design.choices import METHODS, SECTOR
-from identification.base.command_line import CommandGroup
+from identification.base.command_line import CommandGroup, together
 from identification.base.digits import lower_end, upper_end
 from identification.base.errors import InputError
 from identification.base.files import write_whole
@@ -27,32 +26,27 @@ OUTPUT = click.option(
     "--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="design.json to write."
 )
 DESIGN = click.argument("design", type=click.Path(path_type=Path, dir_okay=False))
-
-
-def corrected_options(command: Callable[..., None]) -> Callable[..., None]:
-    """The options of the corrected anti-windup, the same for both designs."""
-    for option in (
-        click.option(
-            "--bandwidth",
-            type=float,
-            help="Corrected anti-windup: no pole of theta1~ beyond it, rad/s; fastest root of P and W_a unless given.",
-        ),
-        click.option(
-            "--sector",
-            type=float,
-            default=SECTOR,
-            show_default=True,
-            help="Corrected anti-windup: sector of the circle criterion, below 1; |u| may reach "
-            "(limit - sector V)/(1 - sector), V the control that the reference takes.",
-        ),
-        click.option(
-            "--recovery",
-            type=float,
-            help="Corrected anti-windup: most time in s for y_d to fall to 1 %; that of the loop itself unless given.",
-        ),
-    ):
-        command = option(command)
-    return command
+corrected_options = together(
+    click.option(
+        "--recovery",
+        type=float,
+        help="Corrected anti-windup: most time in s for y_d to fall to 1 %; that of the loop itself unless given.",
+    ),
+    click.option(
+        "--sector",
+        type=float,
+        default=SECTOR,
+        show_default=True,
+        help="Corrected anti-windup: sector of the circle criterion, below 1; |u| may reach "
+        "(limit - sector V)/(1 - sector), V the control that the reference takes.",
+    ),
+    click.option(
+        "--bandwidth",
+        type=float,
+        help="Corrected anti-windup: no pole of theta1~ beyond it, rad/s; fastest root of P and W_a unless given.",
+    ),
+)
+"""Of the corrected anti-windup, the same for both designs."""
 
 
 @click.group(cls=CommandGroup)

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import click
 
+from identification.base.command_line import together
 from identification.base.errors import InputError
 
 DESIGN = click.argument("design", type=click.Path(path_type=Path, dir_okay=False))
 OUTPUT_FOLDER = click.option(
     "--output", type=click.Path(path_type=Path, file_okay=False), required=True, help="Existing folder for the tables."
 )
-_SINUSOIDS = (
+sinusoid_options = together(
     click.option("--amplitude", type=float, multiple=True, help="Of the reference; once a frequency of DESIGN."),
     click.option("--phase", type=float, multiple=True, help="In radians; once a frequency; 0 unless given."),
     click.option("--offset", type=float, help="Of the reference, 0 unless given."),
 )
-_OTHERS = (
+"""The sinusoids of a reference: ``--amplitude``, ``--phase`` and ``--offset``."""
+
+reference_options = together(
+    sinusoid_options,
     click.option(
         "--slope",
         type=float,
@@ -30,20 +33,7 @@ _OTHERS = (
         help="CSV of time_s and reference, joined by straight lines, instead of the sinusoids.",
     ),
 )
-
-
-def sinusoid_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command ``--amplitude``, ``--phase`` and ``--offset``."""
-    for option in reversed(_SINUSOIDS):
-        command = option(command)
-    return command
-
-
-def reference_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command these and ``--slope`` and ``--reference``."""
-    for option in reversed(_OTHERS):
-        command = option(command)
-    return sinusoid_options(command)
+"""Those, and ``--slope`` and ``--reference``."""
 
 
 def positive_limit(limit: float | None) -> float | None:

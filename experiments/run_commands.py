@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +10,12 @@ import click
 
 from experiments.options import DESIGN, positive_limit, reference_options
 from experiments.tables import write_tables
+from identification.base.command_line import together
 from identification.base.errors import InputError
 
 MOST_ROWS = 1e7
 
-_RUN = (
+_run_options = together(
     DESIGN,
     click.option("--limit", type=float, required=True, help="Saturation limits +-LIMIT; inf for none."),
     click.option("--anti-windup", required=True, help="none, thesis, corrected, or another of DESIGN."),
@@ -26,13 +26,6 @@ _RUN = (
     ),
     click.option("--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV to write."),
 )
-
-
-def _run_options(command: Callable[..., None]) -> Callable[..., None]:
-    """What both commands take."""
-    for option in reversed(_RUN):
-        command = option(command)
-    return command
 
 
 @click.command("simulate")

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
 from experiments.options import DESIGN, positive_limit, sinusoid_options
+from identification.base.command_line import together
 from identification.base.errors import InputError
 
 MOST_PERIODS = 10**4
 
-PLANT_OPTIONS = (
+plant_options = together(
     DESIGN,
     click.option("--plants", type=int, required=True, help="How many plants."),
     click.option(
@@ -24,13 +24,7 @@ PLANT_OPTIONS = (
         "--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Parquet file to write."
     ),
 )
-
-
-def plant_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options that say which plants a campaign has and where it runs."""
-    for option in reversed(PLANT_OPTIONS):
-        command = option(command)
-    return command
+"""Which plants a campaign has, and where it runs."""
 
 
 @click.command("campaign")
