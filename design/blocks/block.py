@@ -14,7 +14,7 @@ from identification.base.arrays import Complex
 from identification.base.errors import InputError
 from identification.base.json_object import number
 from identification.model.plant import AdditiveBound, Mode, PlantModel
-from identification.model.python_control import from_control, leading_to_control
+from identification.model.python_control import from_control, to_control
 
 if TYPE_CHECKING:
     from control import TransferFunction
@@ -104,7 +104,7 @@ class Block:
 
     def to_control(self, pade_order: int = 0) -> TransferFunction:
         """The block as python-control's transfer function, :func:`identification.model.python_control.to_control`."""
-        return leading_to_control(self.gain, self.zeros, self.poles, self.delay_s, pade_order, "block")
+        return to_control(self.gain, self.zeros, self.poles, self.delay_s, pade_order, "block")
 
     @classmethod
     def from_control(cls, system: object, delay_s: float = 0.0) -> Block:

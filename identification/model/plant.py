@@ -152,7 +152,8 @@ class PlantModel:
     def to_control(self, pade_order: int = 0) -> TransferFunction:
         """P(s) as python-control's transfer function, see :func:`identification.model.python_control.to_control`."""
         zeros, poles = _roots(self.zero_modes, self.real_zeros), _roots(self.pole_modes, self.real_poles)
-        return to_control(self.gain, zeros, poles, self.integrators, self.delay_s, pade_order, "P")
+        every = [*poles, *[0j] * self.integrators]
+        return to_control(lowest(self.gain, poles, zeros), zeros, every, self.delay_s, pade_order, "P")
 
     @classmethod
     def from_control(cls, system: object, delay_s: float = 0.0, integrators: int | None = None) -> PlantModel:
@@ -228,8 +229,7 @@ class AdditiveBound:
     @property
     def is_printed_form(self) -> bool:
         """Whether it has one real zero and one pair of poles, as (2.22) has."""
-        counts = (len(self.zero_modes), len(self.pole_modes), len(self.real_zeros), len(self.real_poles))
-        return counts == (0, 1, 1, 0)
+        return (len(self.zero_modes), len(self.pole_modes), len(self.real_zeros), len(self.real_poles)) == (0, 1, 1, 0)
 
     @property
     def corner(self) -> float:
@@ -253,7 +253,7 @@ class AdditiveBound:
     def to_control(self) -> TransferFunction:
         """W_a(s) as python-control's transfer function."""
         zeros, poles = _roots(self.zero_modes, self.real_zeros), _roots(self.pole_modes, self.real_poles)
-        return to_control(self.gain, zeros, poles, 0, 0.0, 0, "W_a")
+        return to_control(lowest(self.gain, poles, zeros), zeros, poles, 0.0, 0, "W_a")
 
     @classmethod
     def from_control(cls, system: object) -> AdditiveBound:

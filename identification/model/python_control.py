@@ -26,25 +26,22 @@ class Roots(NamedTuple):
 
 
 def lowest(gain: float, zeros: Sequence[complex], poles: Sequence[complex]) -> float:
-    """The factor before prod(1 - s/zero)/prod(1 - s/pole), of the leading coefficient ``gain``; no root is 0."""
+    """The factor before prod(1 - s/zero)/prod(1 - s/pole), of the leading coefficient ``gain``; no root is 0.
+
+    With zeros and poles exchanged the leading coefficient, of that factor.
+    """
     return float((gain * np.prod(np.negative(zeros)) / np.prod(np.negative(poles))).real)
 
 
 def to_control(
-    gain: float,
-    zeros: Sequence[complex],
-    poles: Sequence[complex],
-    integrators: int,
-    delay_s: float,
-    pade_order: int,
-    name: str,
+    gain: float, zeros: Sequence[complex], poles: Sequence[complex], delay_s: float, pade_order: int, name: str
 ) -> TransferFunction:
-    """gain/s^integrators * prod(1 - s/zero)/prod(1 - s/pole) * exp(-delay_s s) as python-control's transfer function.
+    """gain * prod(s - zero)/prod(s - pole) * exp(-delay_s s) as python-control's transfer function.
 
     Parameters
     ----------
-    gain, zeros, poles, integrators
-        Roots in rad/s, none of them 0; poles at s = 0 are integrators.
+    gain, zeros, poles
+        Real leading coefficient; roots in rad/s.
     delay_s
         Dead time in seconds, which python-control has no exact form for.
     pade_order
@@ -58,14 +55,6 @@ def to_control(
     InputError
         The order is negative.
     """
-    leading = lowest(gain, poles, zeros)
-    return leading_to_control(leading, zeros, [*poles, *[0j] * integrators], delay_s, pade_order, name)
-
-
-def leading_to_control(
-    gain: float, zeros: Sequence[complex], poles: Sequence[complex], delay_s: float, pade_order: int, name: str
-) -> TransferFunction:
-    """The same of gain * prod(s - zero)/prod(s - pole)."""
     import control
 
     if pade_order < 0:
