@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from identification.base.command_line import CommandGroup
+from identification.base.path_types import INPUT, INPUT_FILE, OUTPUT_FOLDER
 
 
 @click.group(cls=CommandGroup)
@@ -21,11 +22,11 @@ def main() -> None:
 @click.argument("names", metavar="NAME...", nargs=-1, required=True)
 @click.option(
     "--results",
-    type=click.Path(path_type=Path),
+    type=INPUT,
     required=True,
     help="Folder of the tables that the experiments wrote.",
 )
-@click.option("--output", type=click.Path(path_type=Path), required=True, help="Existing folder to write to.")
+@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write to.")
 def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
     """Draw the figures NAME..., such as fig_2_01, each as PDF, SVG and PNG with its caption as text."""
     from paper_figures.look import style
@@ -43,11 +44,11 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
 
 
 @main.command("summary")
-@click.argument("model", type=click.Path(path_type=Path, dir_okay=False))
-@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("model", type=INPUT_FILE)
+@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)
 @click.option(
     "--build",
-    type=click.Path(path_type=Path),
+    type=OUTPUT_FOLDER,
     required=True,
     help="Existing folder of the designs, with the tables in its folder results; to write to, too.",
 )
@@ -75,9 +76,9 @@ def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
 
 
 @main.command("bode")
-@click.argument("model", type=click.Path(path_type=Path, dir_okay=False))
-@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--output", type=click.Path(path_type=Path), required=True, help="Existing folder to write to.")
+@click.argument("model", type=INPUT_FILE)
+@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)
+@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write to.")
 def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
     """Draw SWEEP files, MODEL and the distances under W_a: bode.pdf, .svg and .png, with a caption in bode.txt."""
     from identification.model.model_file import read_model
@@ -93,10 +94,10 @@ def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
 
 @main.command("report")
 @click.argument("model")
-@click.argument("sweeps", metavar="[SWEEP]...", nargs=-1, type=click.Path(path_type=Path))
+@click.argument("sweeps", metavar="[SWEEP]...", nargs=-1, type=INPUT)
 @click.option(
     "--build",
-    type=click.Path(path_type=Path),
+    type=OUTPUT_FOLDER,
     required=True,
     help="Existing folder of claims.csv, the designs, results and figures; to write report/index.html to.",
 )

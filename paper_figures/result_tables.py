@@ -11,7 +11,7 @@ from traceback import walk_tb
 import pandas as pd
 
 from identification.base.errors import InputError, MissingFile
-from identification.base.files import read_text
+from identification.base.files import is_there, read_text
 
 
 def read_table(path: Path, figure: str = "summary") -> pd.DataFrame:
@@ -31,7 +31,7 @@ def read_table(path: Path, figure: str = "summary") -> pd.DataFrame:
     InputError
         The file is no table or has no rows.
     """
-    if not path.is_file():
+    if not is_there(path):
         raise MissingFile(f"{path}: no such table, which {figure} needs")
     try:
         table = pd.read_csv(StringIO(read_text(path)), comment="#")

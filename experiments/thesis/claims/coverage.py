@@ -15,7 +15,7 @@ import pandas as pd
 from data.thesis import THESIS
 from experiments.tables import read_cells
 from experiments.thesis.claims.printed_number import patterns
-from identification.base.errors import InputError
+from identification.base.errors import InputError, shown
 from identification.base.files import read_text
 
 EXCEPTIONS = THESIS / "exceptions.csv"
@@ -49,11 +49,11 @@ def read_exceptions(path: Path = EXCEPTIONS) -> pd.DataFrame:
         if name in (LEFT, QUOTED):
             raise InputError(f"{path}, line {line}: an exception is named {name}; expected another name")
         if scope not in SCOPES:
-            raise InputError(f"{path}, line {line}: scope is {scope!r}; expected {' or '.join(SCOPES)}")
+            raise InputError(f"{path}, line {line}: scope is {shown(scope)}; expected {' or '.join(SCOPES)}")
         try:
             re.compile(pattern)
         except re.error as error:
-            raise InputError(f"{path}, line {line}: {pattern!r} is no regular expression ({error})") from None
+            raise InputError(f"{path}, line {line}: {shown(pattern)} is no regular expression ({error})") from None
     return exceptions
 
 
