@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import errno
 import os
-import stat
-import tempfile
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+import re
+import socket
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from hashlib import sha256
 from io import StringIO
+from itertools import count
 from pathlib import Path
+from stat import S_ISDIR, S_ISREG
 
 from identification.base.errors import InputError, MissingFile
+
+_HOST = sha256(socket.gethostname().encode()).hexdigest()[:8]
+_PARTIAL = re.compile(rf"\.partial-{_HOST}-(\d+)-\d+(\..*)?")
+_numbers = count()
+_partials: set[Path] = set()
+_protected_too: ContextVar[bool] = ContextVar("_protected_too", default=False)
 
 
 def _umask() -> int:
@@ -90,8 +100,8 @@ def require_readable(path: Path) -> None:
         raise MissingFile(f"{path}: no such file") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    if not stat.S_ISREG(mode):
-        found = os.strerror(errno.EISDIR) if stat.S_ISDIR(mode) else "neither file nor folder"
+    if not S_ISREG(mode):
+        found = os.strerror(errno.EISDIR) if S_ISDIR(mode) else "neither file nor folder"
         raise InputError(f"{path}: cannot be read ({found})")
     if not os.access(path, os.R_OK):
         raise InputError(f"{path}: cannot be read ({os.strerror(errno.EACCES)})")
@@ -124,26 +134,39 @@ def require_writable(*targets: Path, inputs: Iterable[Path] = ()) -> None:
     Raises
     ------
     InputError
-        A target is one of the inputs, is named twice, exists and is no regular file, or its folder is missing or may
-        not be written to.
+        A target is one of the inputs, is named twice, exists and is no regular file, is write-protected, or its
+        folder is missing or may not be written to.
     """
+    goals = {path: true_path(path) for path in targets}  # a link is followed, not replaced
     read = {true_path(path) for path in inputs}
-    if len({true_path(path) for path in targets}) < len(targets):
+    if len(set(goals.values())) < len(targets):
         raise InputError(f"{', '.join(map(str, targets))}: two of these are one file; expected different files")
-    for path in targets:
-        goal = true_path(path)  # a link is followed, not replaced
+    for path, goal in goals.items():
         if goal in read:
             raise InputError(f"{path}: is an input too; expected another file to write")
-        if is_there(goal) and not is_file(goal):
-            raise InputError(f"{path}: cannot be written; expected a file, found something else")
         try:
+            _require_replaceable(path, goal)
             goal.parent.stat()
-            if not os.access(goal.parent, os.W_OK | os.X_OK):
-                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-            with suppress(FileNotFoundError):
-                goal.stat()  # a name that is too long, a link to itself
         except OSError as error:
             raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+        if not os.access(goal.parent, os.W_OK | os.X_OK):
+            raise InputError(f"{path}: cannot be written ({os.strerror(errno.EACCES)})")
+
+
+@contextmanager
+def write_protected_too() -> Iterator[None]:
+    """Let :func:`write_whole` replace write-protected files for a ``with`` block."""
+    token = _protected_too.set(True)
+    try:
+        yield
+    finally:
+        _protected_too.reset(token)
+
+
+def remove_partials() -> None:
+    """Remove the files that this process has begun and not ended, as it is about to be ended itself."""
+    for path in tuple(_partials):
+        path.unlink(missing_ok=True)
 
 
 def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterable[Path] = ()) -> None:
@@ -160,32 +183,60 @@ def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterab
     Raises
     ------
     InputError
-        A target is one of the inputs, is named twice, exists and is no regular file, or may not be written.
+        A target is one of the inputs, is named twice, exists and is no regular file, is write-protected, or may not
+        be written.
     """
-    read = {path.resolve() for path in inputs}
-    if len({path.resolve() for path in writers}) < len(writers):
-        raise InputError(f"{', '.join(map(str, writers))}: two of these are one file; expected different files")
-    for path in writers:
-        if path.resolve() in read:
-            raise InputError(f"{path}: is an input too; expected another file to write")
-        if path.exists() and not path.is_file():
-            raise InputError(f"{path}: cannot be written; expected a file, found something else")
+    require_writable(*writers, inputs=inputs)
+    goals = {path: true_path(path) for path in writers}
     written: dict[Path, Path] = {}
     target = next(iter(writers), Path())
     try:
+        for folder in {goal.parent for goal in goals.values()}:
+            _remove_abandoned(folder)
         for target, write in writers.items():
-            goal = target.resolve()  # a link is followed, not replaced
-            handle, name = tempfile.mkstemp(dir=goal.parent, prefix=".partial-", suffix=goal.suffix)
-            os.close(handle)
-            written[goal] = Path(name)
-            write(written[goal])
-            with written[goal].open("rb+") as whole:  # a power cut must not leave a name without its contents
+            goal = goals[target]
+            partial = goal.with_name(f".partial-{_HOST}-{os.getpid()}-{next(_numbers)}{goal.suffix}")
+            _partials.add(partial)
+            written[goal] = partial
+            partial.touch(0o600, exist_ok=False)
+            write(partial)
+            with partial.open("rb+") as whole:  # a power cut must not leave a name without its contents
                 os.fsync(whole.fileno())
-            written[goal].chmod(0o666 & ~_umask())
-        for target, temporary in written.items():
-            temporary.replace(target)
+            partial.chmod(0o666 & ~_umask())
+        for target in writers:
+            written[goals[target]].replace(goals[target])
     except OSError as error:
-        raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+        raise InputError(f"{target}: cannot be written ({error.strerror or error})") from None
     finally:
-        for temporary in written.values():
-            temporary.unlink(missing_ok=True)
+        for partial in written.values():
+            partial.unlink(missing_ok=True)
+            _partials.discard(partial)
+
+
+def _require_replaceable(path: Path, goal: Path) -> None:
+    """Refuse a target that is there and is no regular file or is write-protected; raises OSError as ``stat`` does."""
+    try:
+        mode = goal.stat().st_mode
+    except FileNotFoundError:
+        return
+    if not S_ISREG(mode):
+        raise InputError(f"{path}: cannot be written; expected a file, found something else")
+    if not _protected_too.get() and not (mode & 0o222 and os.access(goal, os.W_OK)):
+        raise InputError(f"{path}: is write-protected; expected a file that may be replaced, or --force")
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Remove what a process of this machine, which is no more, had begun to write in a folder."""
+    for path in folder.glob(".partial-*"):
+        if (found := _PARTIAL.fullmatch(path.name)) and not _runs(int(found[1])):
+            path.unlink(missing_ok=True)
+
+
+def _runs(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except OSError as error:
+        return error.errno != errno.ESRCH
+    except OverflowError:
+        return False
+    return True
