@@ -124,6 +124,9 @@ def tables(rng: random.Random, cheap: bool) -> Case:
     kept = seeds.tables()
     if not cheap and rng.random() < 0.2:
         return _summary(rng)
+    if cheap and rng.random() < 0.9:
+        name = rng.choice(sorted(kept))
+        return Case(("readers", "table", name), {name: changed(kept[name], ".csv", rng)})
     figures = {name: figure_module(name).TABLES for name in figure_names()}
     drawn = [name for name, needed in figures.items() if needed and all(f"{each}.csv" in kept for each in needed)]
     name = rng.choice(drawn)
@@ -203,7 +206,18 @@ def options(rng: random.Random, cheap: bool) -> Case:
     return Case(tuple(arguments), files)
 
 
-LONG = ("claims", "pid", "conditions", "limits", "campaign", "trade-off", "sampled-rates", "report", "equations")
+LONG = (
+    "claims",
+    "pid",
+    "conditions",
+    "limits",
+    "campaign",
+    "trade-off",
+    "sampled-rates",
+    "report",
+    "equations",
+    "coverage",
+)
 """Commands that take long whatever their options."""
 
 RIGHT = {

@@ -14,6 +14,7 @@ from identification.base.command_line import CommandGroup
 from identification.base.path_types import INPUT
 from identification.model.model_file import read_model
 from identification.sweeps.read_sweeps import read_sweeps
+from paper_figures.result_tables import read_table
 
 FILE = click.argument("file", type=INPUT)
 
@@ -46,6 +47,13 @@ def model(file: Path) -> None:
 def sweeps(file: Path) -> None:
     """Sweeps."""
     read_sweeps(file)
+
+
+@main.command("table")
+@FILE
+def table(file: Path) -> None:
+    """A table of results."""
+    read_table(file)
 
 
 @main.command("reference")

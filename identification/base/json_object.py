@@ -23,7 +23,21 @@ def read_json(path: Path, schema: int) -> dict[str, Any]:
     Raises
     ------
     InputError
-        No such file, not JSON, not an object, another schema, or an object that names a member twice.
+        Another schema, or see :func:`read_object`.
+    """
+    content = read_object(path)
+    if content.get("schema") != schema:
+        raise InputError(f"{path}: schema is {shown(content.get('schema'))}; expected {schema}")
+    return content
+
+
+def read_object(path: Path) -> dict[str, Any]:
+    """Read a JSON object.
+
+    Raises
+    ------
+    InputError
+        No such file, not JSON, not an object, or one within it that names a member twice.
     """
     text = read_text(path)
     try:
@@ -32,9 +46,8 @@ def read_json(path: Path, schema: int) -> dict[str, Any]:
         raise InputError(f"{path}, line {error.lineno}: not JSON ({error.msg})") from None
     except (RecursionError, ValueError) as error:  # an InputError among them
         raise InputError(f"{path}: {error}") from None
-    found = content.get("schema") if isinstance(content, dict) else None
-    if not isinstance(content, dict) or found != schema:
-        raise InputError(f"{path}: schema is {shown(found)}; expected {schema}")
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: holds {shown(content)}; expected an object")
     return content
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 from bisect import bisect
 from collections.abc import Iterator
@@ -16,7 +15,7 @@ from data.thesis import THESIS
 from experiments.tables import read_cells
 from experiments.thesis.claims.printed_number import patterns
 from identification.base.errors import InputError, shown
-from identification.base.files import read_text
+from identification.base.json_object import read_object
 
 EXCEPTIONS = THESIS / "exceptions.csv"
 RECORD = THESIS / "coverage.json"
@@ -134,13 +133,10 @@ def read_record(path: Path = RECORD) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The file is missing, is no JSON, or is not what that function returns.
+        The file is not what that function returns, or see :func:`identification.base.json_object.read_object`.
     """
-    try:
-        content = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise InputError(f"{path}, line {error.lineno}: {error.msg}; expected JSON") from None
-    if not isinstance(content, dict) or list(content) != list(RECORDED):
+    content = read_object(path)
+    if list(content) != list(RECORDED):
         raise InputError(f"{path}: expected an object with {', '.join(RECORDED)}")
     return content
 
