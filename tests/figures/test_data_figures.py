@@ -873,12 +873,17 @@ def test_key_error_that_is_no_column_is_not_called_one(tmp_path, monkeypatch):
     assert "no column" not in result.output
 
 
-@pytest.mark.parametrize(("cell", "said"), [("fast", "'fast' in the column limit"), ("1e308", "cannot be drawn")])
-def test_cell_that_cannot_be_drawn_is_one_sentence(tmp_path, cell, said):
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda table: table.assign(time_s="fast"), "'fast' in the column time_s; expected a number or nothing"),
+        (lambda table: table.iloc[:1], "fig_2_14 cannot be drawn of delay_free, delay_free_summary in"),
+        (lambda table: table.assign(time_s=np.nan), "cannot be drawn"),
+    ],
+)
+def test_table_that_cannot_be_drawn_is_one_sentence(tmp_path, damage, said):
     tables = tables_of("fig_2_14")
-    summary = tables["delay_free_summary"].astype({"limit": object})
-    summary["limit"] = cell
-    result = drawn(tmp_path, "fig_2_14", tables | {"delay_free_summary": summary})
+    result = drawn(tmp_path, "fig_2_14", tables | {"delay_free": damage(tables["delay_free"])})
     assert (result.exit_code, result.output.count("\n")) == (2, 1)
     assert said in result.output
     assert not list(tmp_path.glob("fig_*"))
