@@ -25,6 +25,7 @@ from tqdm import tqdm
 
 from benchmarks.fuzz.kinds import KINDS, Case
 from benchmarks.fuzz.outcome import Outcome, run
+from experiments.campaign import distributions
 from paper_figures.look import style
 
 CORPUS = Path(__file__).with_name("corpus")
@@ -36,8 +37,11 @@ AGAIN = 10  # every so many accepted cases are run twice
 def fuzz(
     kind: str, cases: int, seed: int, seconds: float = SECONDS, cheap: bool = False
 ) -> Iterator[tuple[Case, Outcome]]:
-    """The outcomes of so many cases of a kind; case i of a seed is the same whatever the number of cases."""
-    with patch.dict(style._METADATA, clear=cheap):  # drawn, but in no format
+    """The outcomes of so many cases of a kind; case i of a seed is the same whatever the number of cases.
+
+    Where it has to be cheap, figures are drawn, but in no format.
+    """
+    with patch.dict(style._METADATA, clear=cheap), patch.object(distributions, "DIGIT", 8 if cheap else 16):
         for number in range(cases):
             rng = random.Random(f"{kind} {seed} {number} {cheap}")
             case = KINDS[kind](rng, cheap)

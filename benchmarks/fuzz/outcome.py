@@ -108,12 +108,13 @@ def _ended(arguments: Sequence[str], folder: Path, seconds: float) -> tuple[int,
     here = Path.cwd()
     os.chdir(folder)
     try:
-        with _captured() as said, _within(seconds), warnings.catch_warnings():
+        with _captured() as said, _within(seconds), warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")
             status = _status(group, rest, room)
     finally:
         os.chdir(here)
-    return status, *said
+    out, err = said
+    return status, out, "".join(f"{each.category.__name__}: {each.message}\n" for each in warned) + err
 
 
 def _status(group: click.Group, arguments: Sequence[str], room: str) -> int:
