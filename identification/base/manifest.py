@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
@@ -55,7 +55,7 @@ def write_manifest(folder: Path, files: Mapping[str, Written]) -> None:
     path = folder / NAME
     if not files:
         return path.unlink(missing_ok=True)
-    content = {"schema": SCHEMA, "files": {name: asdict(files[name]) for name in sorted(files)}}
+    content = {"schema": SCHEMA, "files": {name: vars(files[name]) for name in sorted(files)}}
     return write_whole(
         {path: lambda partial: partial.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")}
     )
