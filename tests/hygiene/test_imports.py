@@ -117,7 +117,11 @@ def past_the_contracts(tree: Path, file: str) -> list[str]:
         name = getattr(node, "id", None) or getattr(node, "attr", None) or getattr(node, "name", None)
         if file not in BY_NAME and name in ("import_module", "__import__", "runpy"):
             found.append(name)
-        if isinstance(node, ast.Constant) and node not in documents and not ("/thesis/" in file or "antiwindup/" in file):
+        if (
+            isinstance(node, ast.Constant)
+            and node not in documents
+            and not ("/thesis/" in file or "antiwindup/" in file)
+        ):
             found += [str(node.value)] if re.search(r"data/thesis|thesis\.toml", str(node.value)) else []
     return found
 
