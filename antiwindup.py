@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from identification.base.process import begin
+
+begin()
+
 from importlib import import_module
 
 import click
 
+from identification.base.console import Console
+
 ROOMS = ("identification", "design", "experiments", "paper_figures")
 
 
-class Rooms(click.Group):
+class Rooms(Console):
     """The groups of the rooms, each under its room's name and with the first line of its room's docstring."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
