@@ -15,6 +15,7 @@ import warnings
 TYPE_CHECKING = False  # of typing, which takes longer to import than all of this
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from typing import Any
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -55,15 +56,20 @@ def end(number: int, _frame: object = None) -> None:
         for each in SIGNALS:
             signal.signal(each, signal.SIG_IGN)
         begins_children.acquire(timeout=0.1)
-        if processes := sys.modules.get("multiprocessing"):
-            for child in processes.active_children():
-                child.kill()
-        if files := sys.modules.get("identification.base.files"):
-            files.remove_partials()
-        clear = "\r\x1b[K" if sys.stderr.isatty() else ""
-        os.write(sys.stderr.fileno(), f"{clear}Interrupted; {_left}.\n".encode(errors="backslashreplace"))
+        for child in _loaded("multiprocessing", "active_children", list):
+            child.kill()
+        _loaded("identification.base.files", "remove_partials", list)
     finally:
-        os._exit(KILLED + number)
+        try:
+            clear = "\r\x1b[K" if sys.stderr.isatty() else ""
+            os.write(sys.stderr.fileno(), f"{clear}Interrupted; {_left}.\n".encode(errors="backslashreplace"))
+        finally:
+            os._exit(KILLED + number)
+
+
+def _loaded(module: str, function: str, otherwise: Callable[[], Any]) -> Any:
+    """What a function of a module returns, if that is imported, and far enough."""
+    return getattr(sys.modules.get(module), function, otherwise)()
 
 
 def leave_signals_to_parent() -> None:
