@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import threading
+import time
 import warnings
 
 TYPE_CHECKING = False  # of typing, which takes longer to import than all of this
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 KILLED = 128  # a status is that and the signal's number, as a shell gives it
+LONGEST_END_S = 0.1  # that a process has to end the processes that it began
 NOTHING_LOST = "no file is half written"
 
 begins_children = threading.Lock()  # held while a process begins: until it is listed it cannot be ended
@@ -56,9 +58,8 @@ def end(number: int, _frame: object = None) -> None:
         for each in SIGNALS:
             signal.signal(each, signal.SIG_IGN)
         begins_children.acquire(timeout=0.1)
-        for child in _loaded("multiprocessing", "active_children", list):
-            child.kill()
-        _loaded("identification.base.files", "remove_partials", list)
+        _end_children()
+        _loaded("identification.base.files", "remove_partials", list)()
     finally:
         try:
             clear = "\r\x1b[K" if sys.stderr.isatty() else ""
@@ -67,9 +68,22 @@ def end(number: int, _frame: object = None) -> None:
             os._exit(KILLED + number)
 
 
-def _loaded(module: str, function: str, otherwise: Callable[[], Any]) -> Any:
-    """What a function of a module returns, if that is imported, and far enough."""
-    return getattr(sys.modules.get(module), function, otherwise)()
+def _end_children() -> None:
+    """End the processes that this one began: those that can, by themselves, since they may have files to remove."""
+    children = _loaded("multiprocessing", "active_children", list)()
+    for child in children:
+        child.terminate()
+    patience_s = LONGEST_END_S if _loaded("multiprocessing", "parent_process", list)() is None else LONGEST_END_S / 2
+    until = time.monotonic() + patience_s
+    for child in children:
+        child.join(max(until - time.monotonic(), 0.0))
+        child.kill()
+
+
+def _loaded(module: str, function: str, otherwise: Callable[[], Any]) -> Callable[[], Any]:
+    """A function of a module, if that is imported, and far enough."""
+    found: Callable[[], Any] = getattr(sys.modules.get(module), function, otherwise)
+    return found
 
 
 def leave_signals_to_parent() -> None:

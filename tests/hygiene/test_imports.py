@@ -83,16 +83,12 @@ def test_a_face_shows_its_own_room_without_the_thesis(room: str) -> None:
 
 @pytest.mark.parametrize("path", [*sorted((ROOT / "data").glob("*.py")), ROOT / "antiwindup.py"], ids=lambda p: p.name)
 def test_what_stands_beside_the_rooms_imports_none(path: Path) -> None:
-    """The data are made without the tool, and the console command imports a room only when it is asked for.
-
-    What a command needs before anything else lies in identification.base, and imports nothing of the rooms.
-    """
+    """The data are made without the tool, and the console command imports a room only when it is asked for."""
     names = {"identification", "design", "experiments", "paper_figures", "data"}
-    first = {"identification.base.process", "identification.base.console"} if path.name == "antiwindup.py" else set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         modules += [str(node.module)] if isinstance(node, ast.ImportFrom) else []
-        assert not names & {module.split(".")[0] for module in {*modules} - first}
+        assert not names & {module.split(".")[0] for module in modules}
 
 
 ROOMS = ("identification", "design", "experiments", "paper_figures")

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +65,14 @@ def long_run(design: Design) -> tuple[object, tuple[float, float], np.ndarray]:
     return design_loop(design, reference, "thesis"), (-9.0, 9.0), np.array([0.0, 2e4])
 
 
+@pytest.fixture
+def answering() -> Iterator[None]:
+    """Python as it answers Ctrl-C by itself, also where the tests run in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def interrupt_soon() -> float:
     """Interrupt the first thread as Ctrl-C does, in a while; the time when."""
     first = threading.main_thread().ident
@@ -72,6 +81,7 @@ def interrupt_soon() -> float:
     return time.monotonic() + 0.3
 
 
+@pytest.mark.usefixtures("answering")
 def test_ctrl_c_stops_a_run(extended_design: Design) -> None:
     """In a notebook; uninterrupted it would take half a minute."""
     simulate(*long_run(extended_design)[:2], np.array([0.0, 0.1]))  # type: ignore[arg-type]  # compiled now
@@ -85,6 +95,7 @@ def test_ctrl_c_stops_a_run(extended_design: Design) -> None:
     assert threading.active_count() == before
 
 
+@pytest.mark.usefixtures("answering")
 def test_ctrl_c_stops_many_runs(extended_design: Design) -> None:
     runs = simulate_many(
         extended_design,
