@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -56,8 +57,12 @@ COMMANDS = {
     "bode": ["paper_figures", "bode", "{model}", *SWEEPS, "--output", "{folder}"],
     "summary": ["paper_figures", "summary", "{model}", *SWEEPS, "--build", "{folder}"],
     "report": ["paper_figures", "report", "implied", *SWEEPS, "--build", "{folder}"],
+    "refit": ["antiwindup", "refit", *SWEEPS, "--output", "{folder}/built"],
 }  # fmt: skip
 FILES = {"fit": 2, "limits": 2, "interpolation": 3, "claims": 2, "draw": 4, "bode": 4, "summary": 4}  # others one
+
+KEPT = ("c.parquet.parts/", "built/")  # so that the same command goes on
+UNFINISHED = re.compile(r"\.partial-|\.lock")
 
 
 class End(NamedTuple):
@@ -103,8 +108,9 @@ def interrupted(command: str, given: Mapping[str, str], name: str, after_s: floa
         wrong = [f"status {process.returncode}"] if process.returncode != SIGNALS[name] else []
         wrong += [f"said {said!r}"] if len(lines) != 1 or "Traceback" in said else []
         wrong += [f"printed {printed!r}"] if printed else []
-        left = [path for path in _files(Path(folder)) if ".parts/" not in path or ".partial-" in path]
-        wrong += [f"left {left}"] if len(left) not in (0, FILES.get(command, 1)) or ".partial-" in "".join(left) else []
+        left = [path for path in _files(Path(folder)) if not path.startswith(KEPT) or UNFINISHED.search(path)]
+        whole = len(left) in (0, FILES.get(command, 1)) and not UNFINISHED.search(" ".join(left))
+        wrong += [] if whole else [f"left {left}"]
         wrong += [f"process {line} left" for line in _left(process.pid)]
         return End(wrong, seconds)
 
