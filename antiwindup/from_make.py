@@ -5,6 +5,11 @@
 
 from __future__ import annotations
 
+if __name__ == "__main__":
+    from identification.base.process import begin
+
+    begin()
+
 import os
 import shlex
 import sys

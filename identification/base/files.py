@@ -84,6 +84,17 @@ def remove_partials() -> None:
 
 
 @contextmanager
+def removed_at_the_end(path: Path) -> Iterator[None]:
+    """Remove a file, if it is there, at the end of a ``with`` block, or when the process is ended by a signal."""
+    _partials.add(path)
+    try:
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        _partials.discard(path)
+
+
+@contextmanager
 def partial_file(folder: Path, suffix: str) -> Iterator[Path]:
     """A new empty file in a folder, which is gone at the end unless it was renamed; a signal's handler removes it too.
 
@@ -93,13 +104,9 @@ def partial_file(folder: Path, suffix: str) -> Iterator[Path]:
         No file can be made in the folder.
     """
     path = folder / f".partial-{_HOST}-{os.getpid()}-{next(_numbers)}{suffix}"
-    _partials.add(path)
-    try:
+    with removed_at_the_end(path):
         path.touch(0o600, exist_ok=False)
         yield path
-    finally:
-        path.unlink(missing_ok=True)
-        _partials.discard(path)
 
 
 def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterable[Path] = ()) -> None:
