@@ -16,6 +16,7 @@ from identification.base.files import require_writable
 from identification.base.path_types import OUTPUT_FILE
 
 MOST_ROWS = 1e7
+SHARE = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"  # of a run, in a bar
 
 _run_options = together(
     DESIGN,
@@ -52,6 +53,7 @@ def simulate_command(
     """Run DESIGN from rest: time_s, reference, output, error, control, saturated_control."""
     import numpy as np
     import pandas as pd
+    from tqdm import tqdm
 
     from design.anti_windup.compensator import second_order
     from design.asked_model import asked_model
@@ -84,7 +86,8 @@ def simulate_command(
     limits, asked = (-limit, limit), reference_of(content, **reference)
     true = None if plant is None else asked_model(plant).plant
     loop = design_loop(content, asked, kind, true)
-    run = simulate(loop, limits, time_s)
+    with tqdm(total=until, desc="simulate", bar_format=SHARE, disable=None, leave=False) as bar:
+        run = simulate(loop, limits, time_s, bar.update)
     table = pd.DataFrame(
         {
             "time_s": run.time_s,
@@ -134,6 +137,7 @@ def sampled_command(
     """
     import numpy as np
     import pandas as pd
+    from tqdm import tqdm
 
     from design.asked_model import asked_model
     from design.design_file import read_design
@@ -151,7 +155,8 @@ def sampled_command(
     kind = content.chosen(anti_windup)
     asked = reference_of(content, **reference)
     true = None if plant is None else asked_model(plant).plant
-    run = simulate_sampled(content, asked, kind, drive, until, true)
+    with tqdm(total=until * rate, desc="sampled", bar_format=SHARE, disable=None, leave=False) as bar:
+        run = simulate_sampled(content, asked, kind, drive, until, true, bar.update)
     beyond = run.time_s[np.abs(run.control) > limit]
     last = f", the last at {beyond[-1]:.6g} s" if len(beyond) else ""
     promised = ""

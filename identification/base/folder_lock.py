@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from identification.base.errors import InputError
+from identification.base.files import is_there, removed_at_the_end
 
 
 @contextmanager
@@ -26,7 +27,7 @@ def locked_folder(folder: Path) -> Iterator[None]:
     there. Folders that were made and are still empty at the end are removed.
     """
     try:
-        made = [path for path in (folder, *folder.parents) if not path.exists()]
+        made = [path for path in (folder, *folder.parents) if not is_there(path)]
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
@@ -75,9 +76,9 @@ def _held(lock: Path, target: Path) -> Iterator[None]:
         holder.release()
         raise InputError(f"{target}: cannot be written ({error.strerror})") from None
     try:
-        yield
+        with removed_at_the_end(lock):  # before it is let go: the next one's file has the same name
+            yield
     finally:
-        lock.unlink(missing_ok=True)  # before it is let go: the next one's file has the same name
         holder.release()
 
 
