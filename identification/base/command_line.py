@@ -6,6 +6,7 @@ import atexit
 import gc
 import os
 import re
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -68,8 +69,11 @@ class CommandGroup(Console):
             _require_ours(refusal)
             _keep(refusal, None)
         try:
-            with np.errstate(over="raise"):
-                return super().invoke(ctx)
+            with np.errstate(over="raise"), warnings.catch_warnings(record=True) as held:  # a refusal is one sentence
+                result = super().invoke(ctx)
+            for each in held:
+                warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
+            return result
         except InputError as error:
             sentence, is_missing = plain(str(error)), isinstance(error, MissingFile)
         except (ArithmeticError, np.linalg.LinAlgError) as error:

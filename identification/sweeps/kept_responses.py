@@ -45,6 +45,8 @@ def read_responses(path: Path) -> list[FrequencyResponse]:
                 raise ValueError("compressed, which is never written, and may unpack to more than the memory holds")
         with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
             content: dict[str, Any] = dict(kept)
+        if any(np.iscomplexobj(curve) and not name.startswith("response_") for name, curve in content.items()):
+            raise ValueError("complex where real numbers belong")
         return [
             FrequencyResponse(
                 content[f"omega_{i}"],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import click
@@ -31,6 +32,10 @@ def end(how: str) -> None:
         np.linalg.inv(np.zeros((2, 2)))
     if how == "overflow":
         np.exp(np.array([1e4]))
+    if how.startswith("warned"):
+        warnings.warn("odd numbers", RuntimeWarning, stacklevel=1)
+    if how == "warned and refused":
+        raise InputError("the sweep is empty; expected numbers")
     if how == "crash":
         raise RuntimeError(how)
     if how.endswith(".json"):
@@ -59,6 +64,15 @@ def test_a_refusal_is_kept_and_the_exit_status_is_0(tmp_path: Path, how: str, se
     assert [path.name for path in tmp_path.iterdir()] == [kept.name]
     without = CliRunner().invoke(group, ["end", how])
     assert (without.exit_code, without.stderr) == (2, result.stderr)
+
+
+def test_a_warning_is_shown_where_there_is_no_refusal() -> None:
+    with warnings.catch_warnings(record=True) as shown:
+        warnings.simplefilter("always")
+        assert CliRunner().invoke(group, ["end", "warned and refused"]).exit_code == 2
+        assert not shown
+        assert CliRunner().invoke(group, ["end", "warned"]).exit_code == 0
+    assert [str(each.message) for each in shown] == ["odd numbers"]
 
 
 def test_a_success_leaves_no_refusal(tmp_path: Path) -> None:
