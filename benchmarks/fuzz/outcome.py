@@ -22,6 +22,7 @@ from xml.etree import ElementTree
 import click
 
 from benchmarks.fuzz.readers import main as readers
+from identification.base.errors import printable_lines
 
 ROOT = Path(__file__).resolve().parents[2]
 LONGEST = 400  # characters of a sentence beside the longest argument, which it may quote
@@ -210,7 +211,7 @@ def _finite(text: str) -> float:
 
 
 def _is_printable(text: str) -> bool:
-    return all(line.isprintable() for line in text.split("\n"))
+    return printable_lines(text) == text
 
 
 def _content(folder: Path) -> dict[bytes, bytes]:

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from identification.base import process
-from identification.base.errors import printable
+from identification.base.errors import printable_lines
 
 PATIENCE_S = 2.0  # before a terminal is told that a command still works,
 EVERY_S = 0.5  # and how often
@@ -44,7 +44,7 @@ class Console(click.Group):
             status = error.exit_code
             with suppress(OSError):  # nobody is told, but by the status
                 error.show()
-        _print("\n".join(map(printable, printed.getvalue().split("\n"))))
+        _print(printable_lines(printed.getvalue()))
         _flush_errors(status)
         sys.exit(status)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from reprlib import Repr
+from unicodedata import category
 
 LONGEST = 80
 """Characters of a value that a sentence quotes."""
@@ -19,8 +20,13 @@ def shown(value: object) -> str:
 
 
 def printable(text: str) -> str:
-    """A text in which control characters, and bytes of file names that are no UTF-8, are escaped as Python does."""
-    return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
+    """A text on one line: its control characters, and bytes of file names that are no UTF-8, escaped as Python does."""
+    return "".join(each if each.isprintable() or category(each) == "Zs" else ascii(each)[1:-1] for each in text)
+
+
+def printable_lines(text: str) -> str:
+    """The same of each line of a text."""
+    return "\n".join(map(printable, text.split("\n")))
 
 
 class InputError(ValueError):

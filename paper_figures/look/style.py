@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from identification.base.errors import printable
+from identification.base.errors import printable_lines
 from identification.base.files import write_whole
 
 COLUMN_WIDTH = 3.4
@@ -116,9 +116,9 @@ def rendered(figure: Figure, folder: Path, name: str, caption: str) -> dict[Path
         The caption, paragraphs of printable text.
     """
     for text in figure.findobj(Text):
-        if (escaped := _printable_lines(text.get_text())) != text.get_text():
+        if (escaped := printable_lines(text.get_text())) != text.get_text():
             text.set_text(escaped)
-    files = {folder / f"{name}.txt": f"{_printable_lines(caption)}\n".encode()}
+    files = {folder / f"{name}.txt": f"{printable_lines(caption)}\n".encode()}
     with styled():
         for kind, metadata in _METADATA.items():
             figure.savefig(written := BytesIO(), format=kind, metadata=metadata)
@@ -139,7 +139,3 @@ def write(files: Mapping[Path, bytes]) -> None:
 
 def _write_bytes(path: Path, content: bytes) -> None:
     path.write_bytes(content)
-
-
-def _printable_lines(text: str) -> str:
-    return "\n".join(map(printable, text.split("\n")))
