@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -156,3 +157,19 @@ def test_a_member_that_is_given_twice_is_refused(implied: IdentifiedModel, tmp_p
     path.write_text(implied.to_json().replace(f'"gain": {gain}', f'"gain": {gain}, "gain": 1.0', 1), encoding="utf-8")
     with pytest.raises(InputError, match=r"an object has several members 'gain'; expected each once"):
         read_model(path)
+
+
+LOOKS = re.compile(r"\.(exists|is_file|is_dir|resolve)\(")
+LOOKED_AT = (  # at files of the program's own, or where the path of a command has been looked at already
+    *("antiwindup/code_files.py", "identification/base/files.py", "identification/base/temporary_cache.py"),
+    *("experiments/campaign/checkpoint.py", "experiments/thesis/claims/equations_page.py"),
+)
+
+
+def test_no_path_of_a_user_is_looked_at_but_by_what_raises_nothing() -> None:
+    """On Python 3.11 ``Path.exists`` and its like raise for a name that is too long or a folder that is closed."""
+    root = Path(__file__).resolve().parents[2]
+    rooms = ("antiwindup", "identification", "design", "experiments", "paper_figures")
+    modules = [path for room in rooms for path in (root / room).rglob("*.py")]
+    found = {path.relative_to(root).as_posix() for path in modules if LOOKS.search(path.read_text(encoding="utf-8"))}
+    assert found <= set(LOOKED_AT)
