@@ -194,6 +194,8 @@ def options(rng: random.Random, cheap: bool) -> Case:
         value = _odd(rng) if each is odd else _right(each, words[-1], rng)
         if isinstance(each, click.Argument):
             arguments.append(value)
+        elif isinstance(each, click.Option) and each.is_flag:
+            arguments.append(each.opts[0])
         else:
             arguments += [f"{each.opts[0]}={value}"] * (rng.choice((1, 1, 1, 2)) if each.multiple else 1)
     files = {**seeds.models(), **seeds.designs(), **seeds.campaigns(), "sweep.csv": seeds.sweeps()["sweep.csv"]}
