@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+import errno
 import os
-import tempfile
-from collections.abc import Callable, Iterable, Mapping
+import re
+import socket
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from hashlib import sha256
+from itertools import count
 from pathlib import Path
+from stat import S_ISREG
 
 from identification.base.errors import InputError, MissingFile
+
+_HOST = sha256(socket.gethostname().encode()).hexdigest()[:8]
+_PARTIAL = re.compile(rf"\.partial-{_HOST}-(\d+)-\d+(\..*)?")
+_numbers = count()
+_partials: set[Path] = set()
+_protected_too: ContextVar[bool] = ContextVar("_protected_too", default=False)
 
 
 def _umask() -> int:
@@ -54,6 +67,22 @@ def read_bytes(path: Path) -> bytes:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
 
 
+@contextmanager
+def write_protected_too() -> Iterator[None]:
+    """Let :func:`write_whole` replace write-protected files for a ``with`` block."""
+    token = _protected_too.set(True)
+    try:
+        yield
+    finally:
+        _protected_too.reset(token)
+
+
+def remove_partials() -> None:
+    """Remove the files that this process has begun and not ended, as it is about to be ended itself."""
+    for path in tuple(_partials):
+        path.unlink(missing_ok=True)
+
+
 def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterable[Path] = ()) -> None:
     """Write several files so that either all of them appear, whole, or none does.
 
@@ -68,32 +97,66 @@ def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterab
     Raises
     ------
     InputError
-        A target is one of the inputs, is named twice, exists and is no regular file, or may not be written.
+        A target is one of the inputs, is named twice, exists and is no regular file, is write-protected, or may not
+        be written.
     """
-    read = {path.resolve() for path in inputs}
-    if len({path.resolve() for path in writers}) < len(writers):
+    goals = {path: Path(os.path.realpath(path)) for path in writers}  # a link is followed, not replaced
+    read = {os.path.realpath(path) for path in inputs}
+    if len(set(goals.values())) < len(goals):
         raise InputError(f"{', '.join(map(str, writers))}: two of these are one file; expected different files")
-    for path in writers:
-        if path.resolve() in read:
-            raise InputError(f"{path}: is an input too; expected another file to write")
-        if path.exists() and not path.is_file():
-            raise InputError(f"{path}: cannot be written; expected a file, found something else")
     written: dict[Path, Path] = {}
     target = next(iter(writers), Path())
     try:
+        for target, goal in goals.items():
+            if str(goal) in read:
+                raise InputError(f"{target}: is an input too; expected another file to write")
+            _require_replaceable(target, goal)
+        for folder in {goal.parent for goal in goals.values()}:
+            _remove_abandoned(folder)
         for target, write in writers.items():
-            goal = target.resolve()  # a link is followed, not replaced
-            handle, name = tempfile.mkstemp(dir=goal.parent, prefix=".partial-", suffix=goal.suffix)
-            os.close(handle)
-            written[goal] = Path(name)
-            write(written[goal])
-            with written[goal].open("rb+") as whole:  # a power cut must not leave a name without its contents
+            goal = goals[target]
+            partial = goal.with_name(f".partial-{_HOST}-{os.getpid()}-{next(_numbers)}{goal.suffix}")
+            _partials.add(partial)
+            written[goal] = partial
+            partial.touch(0o600, exist_ok=False)
+            write(partial)
+            with partial.open("rb+") as whole:  # a power cut must not leave a name without its contents
                 os.fsync(whole.fileno())
-            written[goal].chmod(0o666 & ~_umask())
-        for target, temporary in written.items():
-            temporary.replace(target)
+            partial.chmod(0o666 & ~_umask())
+        for target in writers:
+            written[goals[target]].replace(goals[target])
     except OSError as error:
-        raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+        raise InputError(f"{target}: cannot be written ({error.strerror or error})") from None
     finally:
-        for temporary in written.values():
-            temporary.unlink(missing_ok=True)
+        for partial in written.values():
+            partial.unlink(missing_ok=True)
+            _partials.discard(partial)
+
+
+def _require_replaceable(path: Path, goal: Path) -> None:
+    """Refuse a target that is there and is no regular file or is write-protected; raises OSError as ``stat`` does."""
+    try:
+        mode = goal.stat().st_mode
+    except FileNotFoundError:
+        return
+    if not S_ISREG(mode):
+        raise InputError(f"{path}: cannot be written; expected a file, found something else")
+    if not _protected_too.get() and not (mode & 0o222 and os.access(goal, os.W_OK)):
+        raise InputError(f"{path}: is write-protected; expected a file that may be replaced, or --force")
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Remove what a process of this machine, which is no more, had begun to write in a folder."""
+    for path in folder.glob(".partial-*"):
+        if (found := _PARTIAL.fullmatch(path.name)) and not _runs(int(found[1])):
+            path.unlink(missing_ok=True)
+
+
+def _runs(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except OSError as error:
+        return error.errno != errno.ESRCH
+    except OverflowError:
+        return False
+    return True
