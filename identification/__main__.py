@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from identification.base.command_line import CommandGroup
+from identification.base.command_line import CommandGroup, together
 from identification.base.files import write_whole
 from identification.model.plant import HIGHEST_ORDER
 
@@ -37,42 +37,48 @@ def main() -> None:
     """From sine sweeps to a plant model with its uncertainty."""
 
 
+fit_options = together(
+    click.option(
+        "--modes", default="auto", type=Counts(8), metavar="auto|N|Z/P", help="Zero and pole modes.  [default: auto]"
+    ),
+    click.option(
+        "--real", default="auto", type=Counts(1), metavar="auto|N|Z/P", help="Real zeros and poles.  [default: auto]"
+    ),
+    click.option(
+        "--integrators",
+        default="auto",
+        type=click.Choice(["auto", "0", "1", "2"]),
+        show_default=True,
+        help="Poles at s = 0.",
+    ),
+    click.option(
+        "--loss",
+        default="least-squares",
+        type=click.Choice(["least-squares", "soft-l1"]),
+        show_default=True,
+        help="soft-l1: outliers can hardly move the fit.",
+    ),
+    click.option(
+        "--bound-order",
+        default=2,
+        type=click.IntRange(1, HIGHEST_ORDER),
+        show_default=True,
+        help="Of W_a; 2 is Eq. (2.22).",
+    ),
+    click.option("--seed", default=0, type=click.IntRange(min=0), show_default=True, help="Of the random restarts."),
+)
+"""How a fit is made."""
+
+
 @main.command()
 @click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--output", required=True, type=click.Path(path_type=Path), help="The model.json to write.")
-@click.option(
-    "--modes", default="auto", type=Counts(8), metavar="auto|N|Z/P", help="Zero and pole modes.  [default: auto]"
-)
-@click.option(
-    "--real", default="auto", type=Counts(1), metavar="auto|N|Z/P", help="Real zeros and poles.  [default: auto]"
-)
-@click.option(
-    "--integrators",
-    default="auto",
-    type=click.Choice(["auto", "0", "1", "2"]),
-    show_default=True,
-    help="Poles at s = 0.",
-)
-@click.option(
-    "--loss",
-    default="least-squares",
-    type=click.Choice(["least-squares", "soft-l1"]),
-    show_default=True,
-    help="soft-l1: outliers can hardly move the fit.",
-)
-@click.option(
-    "--bound-order",
-    default=2,
-    type=click.IntRange(1, HIGHEST_ORDER),
-    show_default=True,
-    help="Of W_a; 2 is Eq. (2.22).",
-)
 @click.option(
     "--responses",
     type=click.Path(path_type=Path),
     help="Keep the responses in this .npz, to be given as a SWEEP later.",
 )
-@click.option("--seed", default=0, type=click.IntRange(min=0), show_default=True, help="Of the random restarts.")
+@fit_options
 def fit(
     sweeps: tuple[Path, ...],
     output: Path,

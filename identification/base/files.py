@@ -7,7 +7,7 @@ import os
 import re
 import socket
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from hashlib import sha256
 from itertools import count
@@ -83,6 +83,25 @@ def remove_partials() -> None:
         path.unlink(missing_ok=True)
 
 
+@contextmanager
+def partial_file(folder: Path, suffix: str) -> Iterator[Path]:
+    """A new empty file in a folder, which is gone at the end unless it was renamed; a signal's handler removes it too.
+
+    Raises
+    ------
+    OSError
+        No file can be made in the folder.
+    """
+    path = folder / f".partial-{_HOST}-{os.getpid()}-{next(_numbers)}{suffix}"
+    _partials.add(path)
+    try:
+        path.touch(0o600, exist_ok=False)
+        yield path
+    finally:
+        path.unlink(missing_ok=True)
+        _partials.discard(path)
+
+
 def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterable[Path] = ()) -> None:
     """Write several files so that either all of them appear, whole, or none does.
 
@@ -104,7 +123,6 @@ def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterab
     read = {os.path.realpath(path) for path in inputs}
     if len(set(goals.values())) < len(goals):
         raise InputError(f"{', '.join(map(str, writers))}: two of these are one file; expected different files")
-    written: dict[Path, Path] = {}
     target = next(iter(writers), Path())
     try:
         for target, goal in goals.items():
@@ -113,24 +131,18 @@ def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterab
             _require_replaceable(target, goal)
         for folder in {goal.parent for goal in goals.values()}:
             _remove_abandoned(folder)
-        for target, write in writers.items():
-            goal = goals[target]
-            partial = goal.with_name(f".partial-{_HOST}-{os.getpid()}-{next(_numbers)}{goal.suffix}")
-            _partials.add(partial)
-            written[goal] = partial
-            partial.touch(0o600, exist_ok=False)
-            write(partial)
-            with partial.open("rb+") as whole:  # a power cut must not leave a name without its contents
-                os.fsync(whole.fileno())
-            partial.chmod(0o666 & ~_umask())
-        for target in writers:
-            written[goals[target]].replace(goals[target])
+        with ExitStack() as stack:
+            partials = {}
+            for target, write in writers.items():
+                partials[target] = stack.enter_context(partial_file(goals[target].parent, goals[target].suffix))
+                write(partials[target])
+                with partials[target].open("rb+") as whole:  # a power cut must not leave a name without its contents
+                    os.fsync(whole.fileno())
+                partials[target].chmod(0o666 & ~_umask())
+            for target, partial in partials.items():
+                partial.replace(goals[target])
     except OSError as error:
         raise InputError(f"{target}: cannot be written ({error.strerror or error})") from None
-    finally:
-        for partial in written.values():
-            partial.unlink(missing_ok=True)
-            _partials.discard(partial)
 
 
 def _require_replaceable(path: Path, goal: Path) -> None:

@@ -1,28 +1,58 @@
-"""The imports of the rooms -> build/prerequisites.mk, make variables with the files that each command hangs on.
-
-    CODE-ROOM-COMMAND    what `python -m ROOM COMMAND` runs and reads of the project's own
-    CODE-thesis-COMMAND  what `python -m experiments thesis COMMAND` does
-    CODE-FIGURE          what the module of a figure does
-    CODE-checks          what the functions that the ledger names do
-    TABLES-FIGURE        the tables that the figure draws
+"""Which files of the project each of its commands hangs on, found from the imports.
 
 An import inside a click command belongs to that command alone; every other one belongs to its module, but for those
 that only type checkers read. A file belongs to the modules that name it: by its path, or by its name where it lies
-beside the module or in data/thesis. Needs nothing but Python, since make asks before there is an environment.
+beside the module or in data/thesis.
 """
 
 from __future__ import annotations
 
 import ast
 import re
-import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
+from hashlib import sha256
+from importlib import metadata
 from pathlib import Path
 
+ROOT = Path(__file__).parents[1]
 ROOMS = ("identification", "design", "experiments", "paper_figures")
-CHECKS, FIGURES = Path("experiments/thesis/claims/checks"), Path("paper_figures/thesis/figures")
+CHECKS, FIGURES = "experiments/thesis/claims/checks", "paper_figures/thesis/figures"
 FILE_NAME = re.compile(r"\w[\w./-]*\.\w+")
+
+
+def code_of(command: Sequence[str]) -> str:
+    """A hash of the code that a command runs, of the project's data that it reads and of the packages that it may use.
+
+    Parameters
+    ----------
+    command
+        The room and the words after it, such as ``("experiments", "thesis", "pid", ...)``.
+    """
+    return _hash_of(frozenset(files_of_command(command)))
+
+
+def files_of_command(command: Sequence[str]) -> list[str]:
+    """The project's own files that a command runs and reads, as paths below its root."""
+    room, *words = command
+    owner, name = ("experiments/thesis", words[1]) if words[0] == "thesis" else (room, words[0])
+    found = [
+        file
+        for path in sorted((ROOT / owner).rglob("*.py"))
+        if name in read(file := path.relative_to(ROOT).as_posix())[1]
+        and (owner != "experiments" or not file.startswith("experiments/thesis/"))
+    ]
+    needed = [*files_of(f"{room}.__main__"), *found, *(each for file in found for each in read(file)[1][name])]
+    if name == "draw":
+        needed += files_of(f"{FIGURES.replace('/', '.')}.{words[1]}")
+    if name == "claims":
+        needed += [path.relative_to(ROOT).as_posix() for path in (ROOT / CHECKS).glob("*.py")]
+    return closure(needed)
+
+
+def figure_tables() -> dict[str, tuple[str, ...]]:
+    """Name of each figure of the thesis and of ours -> the names of the tables that it draws."""
+    return {path.stem: _tables(path) for path in sorted((ROOT / FIGURES).glob("fig_*.py"))}
 
 
 def files_of(module: str) -> list[str]:
@@ -32,7 +62,7 @@ def files_of(module: str) -> list[str]:
         return []
     steps = [Path(*parts[:n]) for n in range(1, len(parts) + 1)]
     found = [step / "__init__.py" for step in steps] + [step.with_suffix(".py") for step in steps]
-    return [path.as_posix() for path in found if path.is_file()]
+    return [path.as_posix() for path in found if (ROOT / path).is_file()]
 
 
 def needs(node: ast.AST, folder: Path) -> Iterator[str]:
@@ -47,7 +77,7 @@ def needs(node: ast.AST, folder: Path) -> Iterator[str]:
             yield from files_of(f"{node.module}.{alias.name}")
     elif isinstance(node, ast.Constant) and isinstance(node.value, str) and FILE_NAME.fullmatch(node.value):
         places = (place / node.value for place in (Path(), folder, Path("data/thesis")))
-        yield from (place.as_posix() for place in places if place.is_file())
+        yield from (place.as_posix() for place in places if (ROOT / place).is_file())
     for below in ast.iter_child_nodes(node):
         yield from needs(below, folder)
 
@@ -63,12 +93,12 @@ def command_name(node: ast.AST) -> str | None:
 @cache
 def read(file: str) -> tuple[frozenset[str], dict[str, frozenset[str]]]:
     """What a module needs, and what each of its commands needs besides."""
-    path = Path(file)
+    path = ROOT / file
     if path.suffix != ".py":
         return frozenset(), {}
     module, commands = set[str](), {}
     for node in ast.parse(path.read_text(encoding="utf-8")).body:
-        found = frozenset(needs(node, path.parent))
+        found = frozenset(needs(node, Path(file).parent))
         if name := command_name(node):
             commands[name] = found
         else:
@@ -86,29 +116,27 @@ def closure(files: Iterable[str]) -> list[str]:
     return sorted(met)
 
 
-def tables(figure: Path) -> list[str]:
+@cache
+def _tables(figure: Path) -> tuple[str, ...]:
     """The names that a figure's module gives as its TABLES."""
     for node in ast.parse(figure.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "TABLES" and node.value:
-            return list(ast.literal_eval(node.value))
-    raise SystemExit(f"{figure}: no TABLES; expected the names of the tables that it draws")
+            return tuple(ast.literal_eval(node.value))
+    raise TypeError(f"{figure}: no TABLES; expected the names of the tables that it draws")
 
 
-def variables() -> dict[str, list[str]]:
-    """Each make variable with its words."""
-    found = {}
-    for room in ROOMS:
-        for file in sorted(path.as_posix() for path in Path(room).rglob("*.py")):
-            owner = "thesis" if file.startswith("experiments/thesis/") else room
-            for name, own in read(file)[1].items():
-                found[f"CODE-{owner}-{name}"] = closure([*files_of(f"{room}.__main__"), file, *own])
-    for path in sorted(FIGURES.glob("fig_*.py")):
-        found[f"CODE-{path.stem}"] = closure(files_of(".".join(path.with_suffix("").parts)))
-        found[f"TABLES-{path.stem}"] = tables(path)
-    found["CODE-checks"] = closure(path.as_posix() for path in CHECKS.glob("*.py"))
-    return found
+@cache
+def _hash_of(files: frozenset[str]) -> str:
+    digests = [f"{file} {sha256((ROOT / file).read_bytes()).hexdigest()}" for file in sorted(files)]
+    return sha256("\n".join([*digests, *_packages()]).encode()).hexdigest()
 
 
-if __name__ == "__main__":
-    text = "".join(f"{name} := {' '.join(words)}\n" for name, words in variables().items())
-    Path(sys.argv[1]).write_text(text, encoding="utf-8")
+@cache
+def _packages() -> tuple[str, ...]:
+    """What the project asks for and runs with, each package with its version; none where it is not installed itself."""
+    try:
+        asked = metadata.requires("antiwindup-thesis") or []
+    except metadata.PackageNotFoundError:
+        return ()
+    names = [re.split(r"[^\w.-]", each)[0] for each in asked if "extra ==" not in each]
+    return tuple(f"{name} {metadata.version(name)}" for name in names)

@@ -1,0 +1,196 @@
+"""A build: the steps whose command, inputs or code changed are run, each in a process of its own, several at once."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from graphlib import TopologicalSorter
+from hashlib import sha256
+from multiprocessing.connection import wait
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+from antiwindup.code_files import code_of
+from antiwindup.output_folder import OutputFolder
+from antiwindup.steps import Step
+from antiwindup.worker import start
+from identification.base.errors import InputError
+from identification.base.files import partial_file, read_text, write_whole
+from identification.base.folder_lock import locked_folder
+from identification.base.manifest import read_manifest
+
+REFUSED = "Error: "
+
+Tell = Callable[[int, Sequence[str]], object]
+"""Called with the number of steps that have ended and the names of those that run."""
+
+
+class Crash(Exception):
+    """A command ended in no way that it should; the message is what it printed."""
+
+
+@dataclass(frozen=True)
+class _Running:
+    step: Step
+    source: str
+    process: BaseProcess
+    log: Path
+    closing: ExitStack
+
+
+@dataclass
+class Build:
+    """A folder and the steps that belong into it.
+
+    Parameters
+    ----------
+    path
+        The folder, which is made if it is not there. It may hold anything else: files that the project did not write,
+        and those that were changed since, are neither replaced nor removed.
+    steps
+        All that belongs into the folder, each after those that it needs. What the project wrote there before and no
+        step writes is removed.
+    wanted
+        The steps that are run, with those that they need. Of the others, what hangs on files that were made anew is
+        removed.
+    goes_on
+        Whether a step that refuses stops only those that need its outputs. The first step stops everything.
+    jobs
+        How many run at once.
+    force
+        Whether files in the places of outputs are replaced whoever wrote them.
+    printed, refused
+        What the steps that ran printed, and the sentences of those that refused, by the steps' names.
+    """
+
+    path: Path
+    steps: Sequence[Step]
+    wanted: Sequence[Step]
+    goes_on: bool
+    jobs: int
+    force: bool = False
+    printed: dict[str, str] = field(default_factory=dict)
+    refused: dict[str, str] = field(default_factory=dict)
+    _made: list[Step] = field(default_factory=list)
+    _running: dict[int, _Running] = field(default_factory=dict)
+
+    def run(self, tell: Tell) -> None:
+        """Bring the files up to date.
+
+        Raises
+        ------
+        InputError
+            Another process writes into the folder; the place of an output is taken; or a step refused that stops all.
+        Crash
+            A step ended in no way that it should.
+        """
+        with locked_folder(self.path):
+            self._folder = OutputFolder(self.path, read_manifest(self.path))
+            places = [path for step in self.steps for path in (*step.outputs, step.refusal)]
+            if not self.force:
+                self._folder.require_free(places)
+            self._folder.remove(set(self._folder.written) - {self._folder.name(path) for path in places})
+            steps = self._before(self.wanted)
+            try:
+                for ended, _ in enumerate(self._ended(steps)):
+                    tell(ended + 1, [running.step.name for running in self._running.values()])
+            finally:
+                for running in self._running.values():
+                    running.process.terminate()
+                    running.process.join()
+                    running.closing.close()
+            self._remove([step for step in self._after(self._made) if step not in steps])
+
+    def _ended(self, steps: Sequence[Step]) -> Iterator[Step]:
+        """The steps as they end."""
+        makers = {output: step for step in steps for output in (*step.outputs, step.refusal)}
+        sorter = TopologicalSorter(
+            {step: {makers[path] for path in (*step.needs, *step.uses) if path in makers} for step in steps}
+        )
+        sorter.prepare()
+        waiting: list[Step] = []
+        while sorter.is_active():
+            waiting = sorted([*waiting, *sorter.get_ready()], key=steps.index)
+            ended = []
+            while waiting and len(self._running) < self.jobs:
+                if self._settled(step := waiting.pop(0)):
+                    ended.append(step)
+            if not ended:
+                ended = [self._settle(self._running.pop(number)) for number in self._ready()]
+            for step in ended:
+                sorter.done(step)
+                yield step
+
+    def _ready(self) -> list[int]:
+        """The numbers of running steps that have ended, once there is one."""
+        return [int(str(number)) for number in wait(list(self._running))]
+
+    def _settled(self, step: Step) -> bool:
+        """Whether nothing is to be done for a step; if something is, it is started."""
+        folder = self._folder
+        if any(folder.content(path) is None for path in step.needs):
+            self._remove([step])
+            return True
+        read = {str(path): folder.content(path) for path in (*step.needs, *step.uses)}
+        source = sha256(json.dumps([step.command, code_of(step.command), read]).encode()).hexdigest()
+        if folder.holds(source, step.outputs):
+            return True
+        if folder.holds(source, [step.refusal]):
+            self.refused[step.name] = read_text(step.refusal).strip()
+            return True
+        self._made.append(step)
+        folder.begin(source, step.outputs)
+        closing = ExitStack()
+        log = closing.enter_context(partial_file(self.path, ".log"))
+        process = start(step.command, log, self.force)
+        self._running[process.sentinel] = _Running(step, source, process, log, closing)
+        return False
+
+    def _settle(self, ended: _Running) -> Step:
+        """Note how a step ended."""
+        step, folder = ended.step, self._folder
+        ended.process.join()
+        said = ended.log.read_text(encoding="utf-8", errors="replace")
+        ended.closing.close()
+        if ended.process.exitcode == 0 and all(folder.content(path) for path in step.outputs):
+            folder.end(step.outputs)
+            folder.remove([folder.name(step.refusal)])
+            self.printed[step.name] = said
+            return step
+        before, refused, sentence = said.strip().rpartition(REFUSED)
+        is_refusal = ended.process.exitcode == 2 and refused and not before
+        if not is_refusal or step is self.steps[0] or not self.goes_on:
+            self._remove(self._after([step]))
+            if is_refusal:
+                raise InputError(sentence)
+            raise Crash(f"{step.name} ended with status {ended.process.exitcode}:\n{said}")
+        self._remove([step])
+        self.refused[step.name] = sentence
+        folder.begin(ended.source, [step.refusal])
+        write_whole({step.refusal: lambda path: path.write_text(f"{sentence}\n", encoding="utf-8")})
+        folder.end([step.refusal])
+        return step
+
+    def _remove(self, steps: Sequence[Step]) -> None:
+        names = [self._folder.name(path) for step in steps for path in (*step.outputs, step.refusal)]
+        self._folder.remove(names)
+
+    def _before(self, wanted: Sequence[Step]) -> list[Step]:
+        """The steps that are wanted and those that they need, in their order."""
+        found, read = [], set[Path]()
+        for step in reversed(self.steps):
+            if step in wanted or read & {*step.outputs}:
+                found.append(step)
+                read |= {*step.needs, *step.uses}
+        return found[::-1]
+
+    def _after(self, made: Sequence[Step]) -> list[Step]:
+        """Steps and those that hang on what they make, in their order."""
+        found, written = [], set[Path]()
+        for step in self.steps:
+            if step in made or written & {*step.needs, *step.uses}:
+                found.append(step)
+                written |= {*step.outputs, step.refusal}
+        return found

@@ -1,0 +1,144 @@
+"""The commands of a build: refit for a plant of the user's, figures and report for the thesis.
+
+Each command imports what it runs, so that a command line answers at once.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from identification.__main__ import fit_options
+from identification.base.command_line import together
+from identification.base.errors import InputError, MissingFile
+
+if TYPE_CHECKING:
+    from antiwindup.steps import Asked, Step
+
+SWEEPS = click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True)
+MODEL = click.option("--model", help="A model.json, or table or implied: what to draw instead of a fit of SWEEP.")
+build_options = together(
+    click.option("--output", required=True, help="Folder to write to."),
+    click.option("--limit", type=float, help="Saturation limits +-LIMIT, instead of the thesis's."),
+    click.option(
+        "--plants", type=click.IntRange(1), default=200, show_default=True, help="Drawn within W_a (Fig. A.6)."
+    ),
+    click.option("--jobs", type=click.IntRange(1), help="How many steps run at once; one a processor unless given."),
+    click.option("--force", is_flag=True, help="Replace what stands in the place of an output, whoever wrote it."),
+    fit_options,
+)
+"""What every build takes."""
+
+
+@click.command("refit")
+@SWEEPS
+@click.option("--report", is_flag=True, help="Make report/index.html too, with the verdicts on the thesis.")
+@build_options
+def refit(sweeps: tuple[str, ...], report: bool, **options: Any) -> None:
+    """Fit SWEEP files, design, simulate, draw and sum up for that plant.
+
+    A second run does what has changed since, and nothing of yours is replaced or removed. Designs and simulations that
+    refuse the plant stop only what needs them.
+    """
+    from antiwindup.steps import refit_steps, report_steps
+
+    asked, how = _asked(sweeps, None, **options)
+    steps = refit_steps(asked)
+    after = report_steps(asked, steps)
+    _build(asked, [*steps, *after], [*steps, *(after if report else [])], goes_on=True, **how)
+
+
+@click.command("figures")
+@SWEEPS
+@MODEL
+@click.option("--only", metavar="FIGURE", multiple=True, help="Such as fig_2_01; all unless given.")
+@build_options
+def figures(sweeps: tuple[str, ...], model: str | None, only: tuple[str, ...], **options: Any) -> None:
+    """Draw the figures of the thesis, and ours, from SWEEP files."""
+    from antiwindup.steps import report_steps, thesis_steps
+
+    asked, how = _asked(sweeps, model, **options)
+    steps = thesis_steps(asked)
+    names = [step.name for step in steps if step.command[:2] == ("paper_figures", "draw")]
+    if unknown := set(only) - set(names):
+        raise InputError(f"--only is {min(unknown)!r}; expected one of {', '.join(names)}")
+    wanted = [step for step in steps if step.name in only] if only else steps
+    _build(asked, [*steps, *report_steps(asked, steps)], wanted, goes_on=False, **how)
+
+
+@click.command("report")
+@SWEEPS
+@MODEL
+@build_options
+def report(sweeps: tuple[str, ...], model: str | None, **options: Any) -> None:
+    """Put the figures with their data, every verdict on the thesis, the fit and the audits on one page of HTML."""
+    from antiwindup.steps import report_steps, thesis_steps
+
+    asked, how = _asked(sweeps, model, **options)
+    steps = thesis_steps(asked)
+    steps += report_steps(asked, steps)
+    _build(asked, steps, steps, goes_on=False, **how)
+
+
+def _asked(
+    sweeps: tuple[str, ...],
+    model: str | None,
+    output: str,
+    limit: float | None,
+    plants: int,
+    jobs: int | None,
+    force: bool,
+    **fit: Any,
+) -> tuple[Asked, dict[str, Any]]:
+    """What a build is for, with files that are there; and how it is run."""
+    from antiwindup.steps import Asked
+    from identification.sweeps.read_sweeps import input_files
+
+    if not output or Path(output).resolve() == Path(Path(output).resolve().anchor):
+        raise InputError(f"--output is {output!r}; expected a folder for the outputs alone")
+    if limit is not None and not 0 < limit < inf:
+        raise InputError(f"--limit is {limit:g}; expected a positive number")
+    for name in (*sweeps, *([model] if model else ()), output):
+        if "\n" in name:
+            raise InputError(f"{name!r}: holds a line break; expected a name of one line")
+    given = [
+        name for name in fit if click.get_current_context().get_parameter_source(name) == ParameterSource.COMMANDLINE
+    ]
+    words = [
+        word
+        for name in given
+        for value in (fit[name],)
+        for word in (
+            f"--{name.replace('_', '-')}",
+            "/".join(map(str, value)) if isinstance(value, tuple) else str(value),
+        )
+    ]
+    asked = Asked(Path(output), model, sweeps, tuple(input_files(sweeps)), tuple(words), limit, plants)
+    for path in (*asked.sweep_files, *(asked.model_files if model else ())):
+        if not path.is_file():
+            raise MissingFile(f"{path}: no such file; expected a sweep, or a model.json, table or implied")
+    return asked, {"jobs": jobs or os.cpu_count() or 1, "force": force}
+
+
+def _build(asked: Asked, steps: Sequence[Step], wanted: Sequence[Step], goes_on: bool, jobs: int, force: bool) -> None:
+    """Run what a build lacks and say what came out."""
+    from tqdm import tqdm
+
+    from antiwindup.build import Build
+
+    build = Build(asked.folder, steps, wanted, goes_on, jobs, force)
+    with tqdm(total=len(steps), unit="", disable=None, leave=False) as bar:
+
+        def tell(ended: int, running: Sequence[str]) -> None:
+            bar.set_description(", ".join(running), refresh=False)
+            bar.update(ended - bar.n)
+
+        build.run(tell)
+    click.echo("".join(build.printed[name] for name in ("fit", "summary", "report") if name in build.printed), nl=False)
+    click.echo(f"{len(build.printed)} of {len(steps)} steps were run, {len(build.refused)} refused -> {asked.folder}")

@@ -1,0 +1,75 @@
+"""What make hands to a build: the values of its variables, by the environment, so that neither make nor a shell reads them.
+
+``python -m antiwindup.from_make refit`` is ``antiwindup refit`` with ANTIWINDUP_SWEEPS, ANTIWINDUP_OUTPUT and so on.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+from collections.abc import Mapping
+
+from antiwindup.__main__ import main
+from identification.base.command_line import Refusal
+from identification.base.errors import InputError
+
+PREFIX = "ANTIWINDUP_"
+
+
+def arguments(build: str, variables: Mapping[str, str]) -> list[str]:
+    """The command line of a build.
+
+    Parameters
+    ----------
+    build
+        refit, figures or report.
+    variables
+        SWEEPS, names as :func:`words` reads them; FIT, options; ONLY, figures; REPORT, yes or nothing; and OUTPUT,
+        MODEL, LIMIT, PLANTS, JOBS, values as they are. What is missing or empty is not given, but for OUTPUT.
+
+    Raises
+    ------
+    InputError
+        A quote in FIT or SWEEPS has no end.
+    """
+    given = {name: value for name, value in variables.items() if value}
+    options = [f"--output={variables['OUTPUT']}"]
+    options += [f"--{name.lower()}={given[name]}" for name in ("MODEL", "LIMIT", "PLANTS", "JOBS") if name in given]
+    options += [f"--only={name}" for name in given.get("ONLY", "").split()]
+    options += ["--report"] if "REPORT" in given else []
+    options += ["--force"] if "FORCE" in given else []
+    return [build, *options, *_split("FIT", given.get("FIT", "")), "--", *words(given.get("SWEEPS", ""))]
+
+
+def words(value: str) -> list[str]:
+    """The names of files in a value: it is one name, if there is such a file; or several with blanks between.
+
+    Names with blanks among several stand in quotes, as in a shell, if not all words are files as they stand.
+
+    Raises
+    ------
+    InputError
+        A quote has no end.
+    """
+    plain = value.split()
+    if os.path.lexists(value):
+        return [value]
+    return plain if all(map(os.path.lexists, plain)) else _split("SWEEPS", value)
+
+
+def _split(name: str, value: str) -> list[str]:
+    try:
+        return shlex.split(value)
+    except ValueError as error:
+        raise InputError(f"{name} is {value!r}: {error}; expected words, quoted where they hold blanks") from None
+
+
+if __name__ == "__main__":
+    handed = {name.removeprefix(PREFIX): value for name, value in os.environ.items() if name.startswith(PREFIX)}
+    try:
+        found = arguments(sys.argv[1], handed)
+    except InputError as error:
+        Refusal(str(error)).show()
+        sys.exit(Refusal.exit_code)
+    main(found, prog_name="antiwindup")

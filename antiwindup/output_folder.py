@@ -1,0 +1,86 @@
+"""The folder of a build: which of its files the project wrote, from what, and which of them may be replaced."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from identification.base.errors import InputError
+from identification.base.manifest import Written, content_of, write_manifest
+
+
+@dataclass
+class OutputFolder:
+    """What stands in a folder and what the project knows of it.
+
+    Parameters
+    ----------
+    path
+        The folder.
+    written
+        What its manifest lists.
+    contents
+        The SHA-256 of each file that was looked at, None of one that is not there.
+    """
+
+    path: Path
+    written: dict[str, Written]
+    contents: dict[Path, str | None] = field(default_factory=dict)
+
+    def name(self, path: Path) -> str:
+        """The name of a file in the manifest."""
+        return path.relative_to(self.path).as_posix()
+
+    def content(self, path: Path) -> str | None:
+        """The SHA-256 of any file, None if it is not there."""
+        if path not in self.contents:
+            self.contents[path] = content_of(path)
+        return self.contents[path]
+
+    def require_free(self, paths: Sequence[Path]) -> None:
+        """Refuse, with an InputError, places of outputs that hold what the project did not write."""
+        for path in paths:
+            written = self.written.get(self.name(path))
+            if written is None and os.path.lexists(path):
+                raise InputError(
+                    f"{path}: is there already, written by somebody else; expected another folder, or --force"
+                )
+            if (
+                written is not None
+                and written.content is not None
+                and self.content(path) not in (None, written.content)
+            ):
+                raise InputError(f"{path}: was changed since it was written; expected another folder, or --force")
+
+    def holds(self, source: str, paths: Iterable[Path]) -> bool:
+        """Whether files stand there as they were written, from this source."""
+        found = [(self.written.get(self.name(path)), self.content(path)) for path in paths]
+        return all(content is not None and written == Written(source, content) for written, content in found)
+
+    def begin(self, source: str, paths: Iterable[Path]) -> None:
+        """Note that files are about to be written: what stands in their places is the project's, whole or not."""
+        for path in paths:
+            path.parent.mkdir(exist_ok=True)
+            self.written[self.name(path)] = Written(source, None)
+            self.contents.pop(path, None)
+        write_manifest(self.path, self.written)
+
+    def end(self, paths: Iterable[Path]) -> None:
+        """Note what the files that were begun hold."""
+        for path in paths:
+            name = self.name(path)
+            self.written[name] = Written(self.written[name].source, self.content(path))
+        write_manifest(self.path, self.written)
+
+    def remove(self, names: Iterable[str]) -> None:
+        """Remove those files that the project wrote and nobody changed; what was changed is the user's from now on."""
+        found = [name for name in names if name in self.written]
+        for name in found:
+            path, written = self.path / name, self.written.pop(name)
+            if written.content is None or written.content == content_of(path):
+                path.unlink(missing_ok=True)
+            self.contents.pop(path, None)
+        if found:
+            write_manifest(self.path, self.written)

@@ -1,0 +1,70 @@
+"""Commands of the rooms, each in a process of its own, forked from one that has the packages loaded already."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import sys
+import threading
+from collections.abc import Sequence
+from contextlib import nullcontext
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+from identification.base.files import write_protected_too
+
+PACKAGES = [
+    "flint",
+    "jinja2",
+    "matplotlib.backends.backend_pdf",
+    "matplotlib.backends.backend_svg",
+    "matplotlib.figure",
+    "numba",
+    "pandas",
+    "scipy.optimize",
+    "scipy.signal",
+    "scipy.stats",
+    "tqdm",
+]
+"""What takes long to import."""
+
+
+def start(command: Sequence[str], log: Path, force: bool) -> BaseProcess:
+    """Start ``antiwindup COMMAND...``; what it prints goes to a file. When this process ends, so does that one.
+
+    Parameters
+    ----------
+    command
+        The room and what stands after it on a command line; no shell reads it.
+    log
+        An existing file.
+    force
+        Whether write-protected outputs are replaced.
+    """
+    has_server = "forkserver" in multiprocessing.get_all_start_methods()
+    context = multiprocessing.get_context("forkserver") if has_server else multiprocessing.get_context("spawn")
+    os.environ["PYTHONSAFEPATH"] = "1"  # the processes import nothing from the folder that they happen to run in
+    context.set_forkserver_preload(PACKAGES)
+    process: BaseProcess = context.Process(target=_run, args=(tuple(command), str(log), force))
+    process.start()
+    return process
+
+
+def _run(command: Sequence[str], log: str, force: bool) -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
+    descriptor = os.open(log, os.O_WRONLY | os.O_APPEND)
+    for stream in (1, 2):
+        os.dup2(descriptor, stream)
+    os.close(descriptor)
+    from antiwindup.__main__ import main
+
+    sys.argv = ["antiwindup", *command]
+    with write_protected_too() if force else nullcontext():
+        main(list(command), prog_name="antiwindup")
+
+
+def _end_after(parent: BaseProcess) -> None:
+    parent.join()
+    os.kill(os.getpid(), 15)

@@ -1,0 +1,91 @@
+"""What the project wrote into a folder: its ``manifest.json``, with the hash of each file and of what it came from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from identification.base.errors import InputError, MissingFile
+from identification.base.files import read_bytes, write_whole
+from identification.base.json_object import member, read_json, record
+
+NAME = "manifest.json"
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class Written:
+    """One file.
+
+    Parameters
+    ----------
+    source
+        Hash of what it was made from: the command, its inputs, the code.
+    content
+        SHA-256 of the file; None while it is being written.
+    """
+
+    source: str
+    content: str | None
+
+
+def read_manifest(folder: Path) -> dict[str, Written]:
+    """Return the files that the manifest of a folder lists, by their paths below it; none where there is no manifest.
+
+    Raises
+    ------
+    InputError
+        The manifest cannot be read or is not one.
+    """
+    path = folder / NAME
+    try:
+        files = member(read_json(path, SCHEMA), "files")
+        return {name: record(Written, member(files, name)) for name in files}
+    except MissingFile:
+        return {}
+    except InputError as error:
+        raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
+
+
+def write_manifest(folder: Path, files: Mapping[str, Written]) -> None:
+    """Write the manifest of a folder, or remove it where there are no files; raises InputError where that fails."""
+    path = folder / NAME
+    if not files:
+        return path.unlink(missing_ok=True)
+    content = {"schema": SCHEMA, "files": {name: asdict(files[name]) for name in sorted(files)}}
+    return write_whole(
+        {path: lambda partial: partial.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")}
+    )
+
+
+def content_of(path: Path) -> str | None:
+    """The SHA-256 of a file, or None if there is no such file; raises InputError where it cannot be read."""
+    try:
+        return sha256(read_bytes(path)).hexdigest()
+    except MissingFile:
+        return None
+
+
+def require_as_written(folder: Path, files: Mapping[str, Written], path: Path, content: str) -> None:
+    """Refuse a file that was changed since the project wrote it.
+
+    Parameters
+    ----------
+    folder, files
+        A folder and what its manifest lists.
+    path
+        Any file; one outside the folder or not listed may hold anything.
+    content
+        The SHA-256 of what was read of it.
+
+    Raises
+    ------
+    InputError
+        The manifest has another hash.
+    """
+    written = files.get(path.relative_to(folder).as_posix()) if path.is_relative_to(folder) else None
+    if written is not None and written.content != content:
+        raise InputError(f"{path}: was changed since it was written; expected the content that {folder / NAME} lists")
