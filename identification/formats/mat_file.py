@@ -39,7 +39,6 @@ def read_mat(path: Path) -> list[Table]:
         The file cannot be read, lacks a variable, or holds one of a wrong type or size.
     """
     require_size(path)
-    content = read_bytes(path)
     headers = _scipy(path, lambda: whosmat(str(path), appendmat=False))
     classes = {name: kind for name, _, kind in headers}
     usable = {name for name, kind in classes.items() if kind in (LABELS if name == "test" else NUMERIC)}
@@ -49,7 +48,7 @@ def read_mat(path: Path) -> list[Table]:
     for name, shape, _ in headers:
         if name in with_labels:
             require_bytes(f"{path}: {name} is {' x '.join(map(str, shape))},", NUMBER * math.prod(map(int, shape)))
-    if not is_sound(content, with_labels):
+    if not is_sound(read_bytes(path), with_labels):
         raise InputError(f"{path}: is damaged; expected {', '.join(with_labels)} of numbers (or of text, test)")
     variables = _scipy(path, lambda: loadmat(str(path), appendmat=False, variable_names=with_labels))
     columns = {name: _numbers(path, name, variables[name]) for name in wanted}
@@ -102,7 +101,7 @@ def _numbers(path: Path, name: str, value: Array) -> Array:
     if value.ndim > 2:
         raise InputError(f"{path}: {name} is {_size(value)}; expected a vector or a matrix")
     value = value.ravel() if 1 in value.shape else value
-    return value.astype(complex if name == COMPLEX else float)
+    return value.astype(complex if name == COMPLEX else float, copy=False)
 
 
 def _labels(path: Path, value: Array, count: int) -> list[str]:

@@ -23,6 +23,7 @@ FEWEST_SAMPLES = 128
 JITTER = 0.05  # largest distance of a sample from the uniform grid, in sampling intervals
 CONSTANT = 1e-9  # of a signal's size
 LARGEST = 1e50  # number in a column
+MOST_POINTS = 20_000_000  # lines or samples of a test; a fit takes some 200 bytes of memory for each
 KEPT = ".npz"
 READERS = {".csv": read_csv, ".mat": read_mat, ".uff": read_uff, ".unv": read_uff, ".58": read_uff}
 
@@ -203,6 +204,8 @@ def _lead(record: Record) -> float:
 
 
 def _check_numbers(table: Table) -> None:
+    if table.numbers.size > MOST_POINTS:
+        table.refuse(f"holds {table.numbers.size} points; expected at most {MOST_POINTS}")
     for column, values in table.columns.items():
         table.refuse_any(~np.isfinite(values), column, "a finite number")
         table.refuse_any(np.abs(values) > LARGEST, column, f"a number up to {LARGEST:g} in size")
