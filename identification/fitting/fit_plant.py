@@ -14,7 +14,7 @@ from identification.fitting.single_test_fit import OneFit, ScaledTest, Undetermi
 from identification.fitting.structure_selection import Selection
 from identification.model.plant import PlantModel
 from identification.model.structure import Structure, Wanted
-from identification.sweeps.response import FrequencyResponse
+from identification.sweeps.response import FrequencyResponse, require_one_band
 
 CORRELATED = 0.3  # correlation of neighbouring residuals above which a fit may have missed something
 
@@ -101,6 +101,7 @@ def fit_plant(
     """
     if not tests:
         raise InputError("no test was given; expected one or more sweeps")
+    require_one_band(tests)
     wanted = wanted or Wanted()
     groups = [grouped(test) for test in tests]
     selection = Selection([ScaledTest(group, soft) for group in groups], wanted, tick)

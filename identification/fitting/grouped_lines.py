@@ -37,7 +37,7 @@ def grouped(test: FrequencyResponse) -> FrequencyResponse:
     return replace(
         test,
         omega=np.add.reduceat(weight * test.omega, first) / total,
-        response=np.add.reduceat(weight * test.response, first) / total,
+        response=np.asarray(np.add.reduceat(weight * test.response, first) / total, dtype=complex),
         coherence=None,
         excitation=1 / total,
     )

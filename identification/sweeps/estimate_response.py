@@ -222,7 +222,7 @@ def _places(width: int) -> tuple[Real, Real]:
 
 
 def _tiles(band: Whole) -> list[Whole]:
-    """The band's lines in windows of odd width, (C, W), narrower where frequencies are low; no more than HELD at once."""
+    """The band's lines in windows of odd width, (C, W), HELD lines at most; narrower where frequencies are low."""
     widest = max(SHORTEST_WINDOW, band.size // WINDOWS) // 2 * 2 + 1
     tiles, first = [], 0
     while first < band.size:

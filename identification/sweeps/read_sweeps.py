@@ -112,7 +112,7 @@ def _from_response(table: Table, name: str) -> FrequencyResponse:
     _check_numbers(table)
     frequency = next(iter(table.columns))
     values = table.columns[frequency]
-    table.refuse_any(values <= 0, frequency, "a positive number")
+    table.refuse_any(values < 1 / LARGEST, frequency, f"a positive number, {1 / LARGEST:g} or more")
     _check_order(table, frequency)
     if values.size < FEWEST_LINES:
         table.refuse(f"holds {values.size} frequencies; expected {FEWEST_LINES} or more")
@@ -162,6 +162,8 @@ def _from_record(table: Table, name: str) -> FrequencyResponse:
     if time_s.size < FEWEST_SAMPLES:
         table.refuse(f"holds {time_s.size} samples; expected {FEWEST_SAMPLES} or more")
     sampling_s = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
+    if sampling_s < 1 / LARGEST:
+        table.refuse(f"the samples lie {sampling_s:.3g} s apart; expected {1 / LARGEST:g} s or more")
     _check_uniform(table, sampling_s)
     held = "input_held" in table.columns
     driven = "input_held" if held else "input"
