@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+if __name__ == "__main__":
+    from identification.base.process import begin
+
+    begin()
+
 from importlib import import_module
 
 import click

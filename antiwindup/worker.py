@@ -12,6 +12,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from identification.base.files import write_protected_too
+from identification.base.process import begin, begins_children, leave_signals_to_parent
 
 PACKAGES = [
     "flint",
@@ -46,7 +47,8 @@ def start(command: Sequence[str], log: Path, force: bool) -> BaseProcess:
     os.environ["PYTHONSAFEPATH"] = "1"  # the processes import nothing from the folder that they happen to run in
     context.set_forkserver_preload(PACKAGES)
     process: BaseProcess = context.Process(target=_run, args=(tuple(command), str(log), force))
-    process.start()
+    with begins_children:
+        process.start()
     return process
 
 
@@ -58,6 +60,8 @@ def _run(command: Sequence[str], log: str, force: bool) -> None:
     for stream in (1, 2):
         os.dup2(descriptor, stream)
     os.close(descriptor)
+    leave_signals_to_parent()
+    begin()
     from antiwindup.__main__ import main
 
     sys.argv = ["antiwindup", *command]

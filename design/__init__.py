@@ -14,4 +14,4 @@ Design(extended, reference at 1.5 rad/s, anti-windups thesis, corrected)
 
 from identification.base.faces import face
 
-__getattr__, __dir__, __all__ = face(__name__, __file__)
+__getattr__, __dir__ = face(__name__, __file__)

@@ -14,6 +14,7 @@ from identification.base.command_line import together
 from identification.base.errors import InputError
 
 MOST_ROWS = 1e7
+SHARE = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"  # of a run, in a bar
 
 _run_options = together(
     DESIGN,
@@ -50,6 +51,7 @@ def simulate_command(
     """Run DESIGN from rest: time_s, reference, output, error, control, saturated_control."""
     import numpy as np
     import pandas as pd
+    from tqdm import tqdm
 
     from design.anti_windup.compensator import second_order
     from design.asked_model import asked_model
@@ -80,7 +82,8 @@ def simulate_command(
     limits, asked = (-limit, limit), reference_of(content, **reference)
     true = None if plant is None else asked_model(plant).plant
     loop = design_loop(content, asked, kind, true)
-    run = simulate(loop, limits, time_s)
+    with tqdm(total=until, desc="simulate", bar_format=SHARE, disable=None, leave=False) as bar:
+        run = simulate(loop, limits, time_s, bar.update)
     table = pd.DataFrame(
         {
             "time_s": run.time_s,
@@ -130,6 +133,7 @@ def sampled_command(
     """
     import numpy as np
     import pandas as pd
+    from tqdm import tqdm
 
     from design.asked_model import asked_model
     from design.design_file import read_design
@@ -145,7 +149,8 @@ def sampled_command(
     kind = content.chosen(anti_windup)
     asked = reference_of(content, **reference)
     true = None if plant is None else asked_model(plant).plant
-    run = simulate_sampled(content, asked, kind, drive, until, true)
+    with tqdm(total=until * rate, desc="sampled", bar_format=SHARE, disable=None, leave=False) as bar:
+        run = simulate_sampled(content, asked, kind, drive, until, true, bar.update)
     beyond = run.time_s[np.abs(run.control) > limit]
     last = f", the last at {beyond[-1]:.6g} s" if len(beyond) else ""
     promised = ""

@@ -12,4 +12,4 @@ IdentifiedModel(gain ..., integrators 1, 2 zero and 2 pole modes, dead time ... 
 
 from identification.base.faces import face
 
-__getattr__, __dir__, __all__ = face(__name__, __file__)
+__getattr__, __dir__ = face(__name__, __file__)

@@ -5,6 +5,11 @@ The command imports what it runs, so that a command line answers at once.
 
 from __future__ import annotations
 
+if __name__ == "__main__":
+    from identification.base.process import begin
+
+    begin()
+
 from collections.abc import Callable
 from pathlib import Path
 

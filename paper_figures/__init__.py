@@ -10,4 +10,4 @@
 
 from identification.base.faces import face
 
-__getattr__, __dir__, __all__ = face(__name__, __file__)
+__getattr__, __dir__ = face(__name__, __file__)

@@ -5,6 +5,11 @@ Each command imports what it runs, so that a command line answers at once, and m
 
 from __future__ import annotations
 
+if __name__ == "__main__":
+    from identification.base.process import begin
+
+    begin()
+
 from pathlib import Path
 
 import click

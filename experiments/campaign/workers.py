@@ -9,11 +9,11 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
-from signal import SIG_IGN, SIGINT, signal
 from threading import Thread
 from typing import Any
 
 from experiments.campaign.run_plants import Campaign, Columns, run_chunk
+from identification.base import process
 from identification.base.errors import InputError
 
 Chunk = tuple[int, int]  # the first plant and the one after the last
@@ -47,7 +47,9 @@ def run_here(campaign: Campaign, chunks: Sequence[Chunk]) -> Done:
         try:
             while True:
                 for chunk in waiting:
-                    running[pool.submit(run_chunk, campaign, *chunk)] = chunk
+                    with process.begins_children:
+                        future = pool.submit(run_chunk, campaign, *chunk)
+                    running[future] = chunk
                     if len(running) >= AHEAD * cores:
                         break
                 if not running:
@@ -129,7 +131,7 @@ def _run_on(address: str, campaign: Campaign, chunks: Sequence[Chunk]) -> Done:
 
 def _begin() -> None:
     """In a new process: leave Ctrl-C to the parent, and end with it, however it ends."""
-    signal(SIGINT, SIG_IGN)
+    process.leave_signals_to_parent()
     parent = parent_process()
     assert parent is not None
 

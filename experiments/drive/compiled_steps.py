@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.drive.difference_equations import SampledBlock
+from experiments.engine.watched import REACHED, STOP
 from identification.base.arrays import Array
 from identification.base.compiled import njit
 
@@ -139,12 +140,13 @@ def _late(whole: int, now: float, before: float, p: Array, k: int) -> float:
 @njit(nogil=True)
 def run(
     forward: SampledBlock, feedback: SampledBlock, theta: SampledBlock, plant: Series, actuator: Actuator, T: float,
-    r: Array,
+    r: Array, watch: Array,
 ) -> tuple[Array, Array, Array, Array, int]:  # fmt: skip
     """y, u, commands, the actuator's place as each command is issued (s,), and how many samples were reached.
 
     ``forward`` maps e to v, ``feedback`` v to what is fed back to it, and ``theta`` u_tilde to what u gives up and to
-    y_d; ``feedback`` and y_d have one dead time, the model's.
+    y_d; ``feedback`` and y_d have one dead time, the model's. ``watch`` is that of
+    :func:`experiments.engine.watched.watched`: the samples reached, and whether to stop there.
     """
     # out of the tuples, into which a look costs as much as an addition
     A_K, b_K, c_K, d_K = forward.A, forward.b, forward.C[0], forward.d[0]
@@ -165,6 +167,9 @@ def run(
     most_u, most_x = (MOST * limit, ENORMOUS) if limit > 0 else (MOST, MOST)
     place = _given_out(actuator, 0.0)
     for k in range(s):
+        watch[REACHED] = k
+        if watch[STOP] != 0.0:
+            return y, u, command, start, k
         p_T[k], p_w[k] = _dot(c_T, x_T), _row(C_w, 1, x_w)
         e = r[k] - y[k] - _late(whole, now, before, p_w, k)
         v = (_dot(c_K, x_K) + d_K * e + _late(whole, now, before, p_T, k)) / (1 - around)

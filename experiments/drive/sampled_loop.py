@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from design.design_file import Asked, Design
 from experiments.drive.compiled_steps import Actuator, Series, run
 from experiments.drive.difference_equations import METHODS, SampledBlock, sample_block, split
 from experiments.engine.simulate import MOST_STEPS, DivergenceError, limit_pair
+from experiments.engine.watched import Tick, watched
 from experiments.runs.references import Reference, SampledReference
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
@@ -124,6 +126,7 @@ def simulate_sampled(
     drive: Drive,
     until_s: float,
     plant: PlantModel | None = None,
+    tick: Tick | None = None,
 ) -> SampledRun:
     """Run a design from rest with its controller on a computer.
 
@@ -135,6 +138,8 @@ def simulate_sampled(
         The computer and the actuator.
     until_s
         Length of the run in seconds, one sample at least.
+    tick
+        Called some times a second with the number of samples done since the last call.
 
     Raises
     ------
@@ -166,7 +171,9 @@ def simulate_sampled(
     controller = _controller(design, design.chosen(anti_windup), drive)
     time_s = instants(drive.rate_hz, until_s)
     r = reference(time_s)
-    y, u, command, start, reached = run(*controller, series, drive.actuator, 1 / drive.rate_hz, r)
+    y, u, command, start, reached = watched(
+        partial(run, *controller, series, drive.actuator, 1 / drive.rate_hz, r), tick
+    )
     if reached < len(r):
         raise DivergenceError(float(time_s[reached]))
     return SampledRun(time_s, r, y, r - y, u, _actuator(drive, command, start))

@@ -18,6 +18,7 @@ from experiments.engine.crossings import leaves_mode
 from experiments.engine.kinks import BEYOND, Past, drop, images, shift
 from experiments.engine.signals import change, driven, expand, fill, unfold
 from experiments.engine.step_table import NEGLIGIBLE, NOTHING, advance, dot, times, whole_lanes
+from experiments.engine.watched import REACHED, STOP
 from identification.base.arrays import Array
 from identification.base.compiled import njit
 
@@ -26,7 +27,7 @@ SETTLED = 4.0  # of what is negligible, when it moves by no more than that
 DIVERGENT = 1e100  # times the limits, or without limits of a state: beyond it a loop diverges
 ENORMOUS = 1e250  # a state with which no run goes on, whatever the limits
 
-COMPLETE, DIVERGED, ENDLESS, CROWDED, EVENTFUL, UNSETTLED = 0, 1, 2, 3, 4, 5
+COMPLETE, DIVERGED, ENDLESS, CROWDED, EVENTFUL, UNSETTLED, STOPPED = 0, 1, 2, 3, 4, 5, 6
 
 
 class Bounds(NamedTuple):
@@ -40,7 +41,7 @@ class Bounds(NamedTuple):
 @njit(nogil=True)
 def integrate(
     loop: CompiledLoop, reset_times: Array, resets: Array, low: float, high: float, samples: Array, horizon: float,
-    bounds: Bounds,
+    bounds: Bounds, watch: Array,
 ) -> tuple[Array, Array, Array, int, float, int, float]:  # fmt: skip
     """Integrate one loop from rest of its delayed signals, w_j(t < 0) = Z_j x0.
 
@@ -59,12 +60,15 @@ def integrate(
         End time in seconds.
     bounds
         Where to give up.
+    watch
+        Of :func:`experiments.engine.watched.watched`: the time reached, and whether to stop there.
 
     Returns
     -------
     values (1 + o, s), events (e,), modes (e,), status, end, steps, tail
         u and what is watched at the samples; event times with the mode entered (-1, 0, 1); COMPLETE, DIVERGED,
-        ENDLESS (too many steps), CROWDED (too little room), EVENTFUL or UNSETTLED (a brief dead time is too long);
+        ENDLESS (too many steps), CROWDED (too little room), EVENTFUL, UNSETTLED (a brief dead time is too long) or
+        STOPPED;
         the time reached; the number of steps; the largest last term of a signal's polynomial, as a share of the
         largest that the signal was.
     """
@@ -115,6 +119,10 @@ def integrate(
             status = ENDLESS
             break
         steps += 1
+        watch[REACHED] = t
+        if watch[STOP] != 0.0:
+            status = STOPPED
+            break
         t_next = min(t + step, horizon)
         if queued > 0 and queue[0] - t < step * (1 + 1e-9):
             t_next = min(queue[0], horizon)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from experiments.engine import integrator
 from experiments.engine.compiled_loop import BRIEF, CompiledLoop, compile_loop
 from experiments.engine.saturated_loop import SaturatedLoop
+from experiments.engine.watched import Stopped, Tick, watched
 from identification.base.errors import InputError
 
 if TYPE_CHECKING:
@@ -83,7 +85,7 @@ class DivergenceError(InputError):
         self.time_s = time_s
 
 
-def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarray) -> Run:
+def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarray, tick: Tick | None = None) -> Run:
     """Simulate a loop from t = 0; what is left out, u - sat(u), is the dead zone of Thesis Eq. (2.16).
 
     Parameters
@@ -94,6 +96,8 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
         (sigma_1, sigma_2) of the saturation, sigma_1 < sigma_2, either may be infinite.
     time_s
         Increasing sample times (s,), the first at 0 or later; they do not influence the integration.
+    tick
+        Called some times a second with the seconds of the run done since the last call.
 
     Raises
     ------
@@ -107,7 +111,20 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
     -----
     Dead times are exact and events are located on the polynomials, see :mod:`experiments.engine.integrator`. The step,
     see :func:`experiments.engine.compiled_loop.compile_loop`, is halved until the last term of every polynomial is
-    below 1e-11 of the largest value of its signal.
+    below 1e-11 of the largest value of its signal. Ctrl-C stops a run between two steps.
+    """
+    return watched(partial(simulate_watched, loop, limits, time_s), tick)
+
+
+def simulate_watched(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarray, watch: np.ndarray) -> Run:
+    """:func:`simulate` in the calling thread, under a watch of :mod:`experiments.engine.watched`.
+
+    Raises
+    ------
+    InputError, DivergenceError
+        As of :func:`simulate`.
+    Stopped
+        The watch says so.
     """
     low, high = limits
     if not low < high:
@@ -129,6 +146,7 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
             time_s - compiled.lags[:, None],
             horizon,
             integrator.Bounds(int(MOST_STEPS), most_events, room),
+            watch,
         )
         if status == integrator.CROWDED:
             room *= 2
@@ -140,6 +158,8 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
             room = max(room, _room(compiled))
         else:
             break
+    if status == integrator.STOPPED:
+        raise Stopped
     if status == integrator.DIVERGED:
         raise DivergenceError(end)
     if status != integrator.COMPLETE:

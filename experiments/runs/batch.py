@@ -13,7 +13,8 @@ import numpy as np
 from tqdm import tqdm
 
 from design.design_file import Asked, Design
-from experiments.engine.simulate import Run, simulate
+from experiments.engine.simulate import Run, simulate_watched
+from experiments.engine.watched import STOP, watch
 from experiments.runs.design_loop import Controller, plant_loop, realized_controller
 from experiments.runs.references import Reference, SampledReference
 from identification.base.errors import InputError
@@ -88,10 +89,12 @@ def simulate_many(
 def _streamed(
     cases: Iterator[Case], controllers: Mapping[str, Controller], time_s: np.ndarray, workers: int
 ) -> Iterator[tuple[Case, Run | InputError]]:
+    state = watch()
+
     def run(case: Case) -> Run | InputError:
         try:
             loop = plant_loop(controllers[case.anti_windup], case.plant, case.reference)
-            return simulate(loop, (-case.limit, case.limit), time_s)
+            return simulate_watched(loop, (-case.limit, case.limit), time_s, state)
         except InputError as error:
             return error
 
@@ -107,7 +110,8 @@ def _streamed(
                 case, future = ahead.popleft()
                 yield case, future.result()
                 bar.update()
-        finally:  # whoever stops taking results stops the runs that have not begun
+        finally:  # whoever stops taking results stops the runs
+            state[STOP] = 1.0
             pool.shutdown(wait=False, cancel_futures=True)
 
 

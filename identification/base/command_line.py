@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import gc
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,12 @@ from typing import Any
 import click
 import numpy as np
 
+from identification.base.console import Console
 from identification.base.errors import InputError, MissingFile
 from identification.base.files import write_whole
 
 KEPT = ".refused.txt"  # how the name of a kept refusal ends
+QUOTED = 80  # characters of a value in a sentence
 EXTRAS = {"dask": "campaign", "distributed": "campaign", "pyarrow": "campaign"}  # of pyproject.toml, by their modules
 
 
@@ -39,11 +42,12 @@ class Refusal(click.ClickException):
     exit_code = 2
 
 
-class CommandGroup(click.Group):
+class CommandGroup(Console):
     """A click group whose commands answer an :class:`InputError` with its sentence and exit status 2.
 
-    So they do when finite numbers lead out of what floating point can hold: an overflow, a singular matrix, an
-    array larger than the memory; and where a module of an extra is not installed.
+    So they do when finite numbers lead out of what floating point can hold, an overflow or a singular matrix; where
+    the memory does not suffice; and where a module of an extra is not installed. Control characters in a sentence,
+    which may come from a file or a name, are shown as escapes, and what it quotes is cut.
 
     With ``--refusal FILE``, for a chain of commands that goes on without the one that refuses, the exit status is 0
     and the sentence stands in FILE too, whose name ends in .refused.txt. A command that lacks an input, which one
@@ -67,20 +71,32 @@ class CommandGroup(click.Group):
             with np.errstate(over="raise"):
                 return super().invoke(ctx)
         except InputError as error:
-            sentence, is_missing = str(error), isinstance(error, MissingFile)
-        except (ArithmeticError, np.linalg.LinAlgError, MemoryError) as error:
+            sentence, is_missing = plain(str(error)), isinstance(error, MissingFile)
+        except (ArithmeticError, np.linalg.LinAlgError) as error:
             sentence, is_missing = f"the numbers given are too extreme to compute with ({error})", False
+        except MemoryError as error:
+            asked = f" ({str(error)[:1].lower()}{str(error)[1:]})" if str(error) else ""
+            sentence, is_missing = f"out of memory{asked}; expected less input, or a machine with more memory", False
         except ModuleNotFoundError as error:
             if error.name not in EXTRAS:
                 raise
             extra = f'pip install "antiwindup-thesis[{EXTRAS[error.name]}]"'
             raise Refusal(f"{error.name} is not installed, which this command needs; give {extra}") from None
+        except click.ClickException as error:
+            error.message = plain(error.message)  # type: ignore[misc]
+            raise
         if refusal is None:
             raise Refusal(sentence)
         if is_missing:
             return click.echo(f"{sentence}; nothing is done", err=True)
         Refusal(sentence).show()
         return _keep(refusal, sentence)
+
+
+def plain(sentence: str) -> str:
+    """A sentence for a terminal: characters that do not print as escapes, what is quoted cut at QUOTED characters."""
+    shown = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in sentence)
+    return re.sub(rf"(?<!\w)'([^']{{{QUOTED}}})[^']+'(?!\w)", r"'\1...'", shown)
 
 
 def _require_ours(refusal: Path) -> None:

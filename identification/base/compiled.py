@@ -18,6 +18,8 @@ from typing import Any
 import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
 
+from identification.base.temporary_cache import temporary_cache
+
 
 def cache_folders() -> Iterator[Path]:
     """Where files of this user may be kept, best first; folders that need not exist nor allow writing.
@@ -29,11 +31,8 @@ def cache_folders() -> Iterator[Path]:
     users = Path(os.path.expanduser(os.environ.get("XDG_CACHE_HOME") or "~/.cache"))  # noqa: PTH111  # raises nothing
     if users.is_absolute():
         yield users / "antiwindup"
-    user = getattr(os, "getuid", int)()
-    below = Path(tempfile.gettempdir()) / f"antiwindup-{user}"
-    below.mkdir(mode=0o700, exist_ok=True)
-    if below.lstat().st_uid == user:  # else anybody could have put code there
-        yield below
+    if (below := temporary_cache()) is not None:
+        yield below[0]
 
 
 @cache
@@ -85,6 +84,20 @@ class _CacheImpl(CompileResultCacheImpl):
 
 class _FunctionCache(FunctionCache):
     _impl_class = _CacheImpl
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        if (kept := super().load_overload(sig, target_context)) is None:  # type: ignore[no-untyped-call]
+            _say_that_it_compiles()
+        return kept
+
+
+@cache
+def _say_that_it_compiles() -> None:
+    """On a terminal, once a process."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        from tqdm import tqdm
+
+        tqdm.write("Compiling, once for this machine: some 20 s.", file=sys.stderr)
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:

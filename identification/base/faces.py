@@ -1,15 +1,17 @@
-"""The face of a room: what its ``__init__.pyi`` imports, imported when it is asked for."""
+"""The face of a room: what its ``__init__.pyi`` imports, imported when it is asked for.
+
+Every command imports this before it can answer a signal, and with it nothing else.
+"""
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Callable
-from importlib import import_module
-from pathlib import Path
-from typing import Any
+TYPE_CHECKING = False  # of typing, which takes a while to import
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
 
 
-def face(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+def face(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """What a package needs to import on request what the stub beside it imports.
 
     Parameters
@@ -21,16 +23,29 @@ def face(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], li
     Returns
     -------
     tuple
-        ``__getattr__`` and ``__dir__`` of the package (PEP 562), and ``__all__``.
+        ``__getattr__`` and ``__dir__`` of the package (PEP 562); the former knows ``__all__`` too.
     """
-    stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
-    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
-    homes = {alias.asname or alias.name: (str(node.module), alias.name) for node in imports for alias in node.names}
+    homes: dict[str, tuple[str, str]] = {}
+
+    def names() -> list[str]:
+        import ast
+        from pathlib import Path
+
+        if not homes:
+            stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
+            for node in stub.body:
+                if isinstance(node, ast.ImportFrom):
+                    homes.update({alias.asname or alias.name: (str(node.module), alias.name) for alias in node.names})
+        return sorted(homes)
 
     def get(name: str) -> Any:
-        if name not in homes:
+        from importlib import import_module
+
+        if name == "__all__":
+            return names()
+        if name not in names():
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         module, own_name = homes[name]
         return getattr(import_module(module), own_name)
 
-    return get, lambda: sorted(homes), sorted(homes)
+    return get, names

@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from identification.base.errors import InputError
+from identification.base.files import removed_at_the_end
 
 
 @contextmanager
@@ -77,9 +78,9 @@ def _held(lock: Path, target: Path) -> Iterator[None]:
         holder.release()
         raise InputError(f"{target}: cannot be written ({error.strerror})") from None
     try:
-        yield
+        with removed_at_the_end(lock):  # before it is let go: the next one's file has the same name
+            yield
     finally:
-        lock.unlink(missing_ok=True)  # before it is let go: the next one's file has the same name
         holder.release()
 
 
