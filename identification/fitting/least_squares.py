@@ -59,6 +59,17 @@ def stacked(columns: Complex) -> Real:
     return np.ascontiguousarray(columns.T).view(float)
 
 
+def information(structure: Structure, theta: Real, omega: Real, sigma: Real) -> Real:
+    """Products (p, p) of the derivatives of :func:`response_of` over sigma (M,), summed over the lines."""
+    total = np.zeros((structure.size, structure.size))
+    for first in range(0, omega.size, BLOCK):
+        part = slice(first, first + BLOCK)
+        model = response_of(structure, theta, omega[part]) / sigma[part]
+        rows = stacked(model[:, None] * log_jacobian(structure, theta, omega[part]))
+        total += rows @ rows.T
+    return total
+
+
 def least_squares(
     structure: Structure,
     theta: Real,

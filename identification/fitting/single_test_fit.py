@@ -10,7 +10,7 @@ import numpy as np
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
 from identification.fitting.first_guess import guesses
-from identification.fitting.least_squares import BLOCK, log_jacobian, response_of, stacked
+from identification.fitting.least_squares import information, response_of
 from identification.fitting.likelihood import Likely, Lines, maximise
 from identification.fitting.neighbouring_structures import grown
 from identification.model.plant import PlantModel
@@ -253,12 +253,7 @@ class ScaledTest:
     def _covariance(self, likely: Likely, spread: float) -> Real:
         """Covariance (p, p) of theta in physical units."""
         structure, sigma = likely.structure, self._sigma(likely)
-        curvature = np.zeros((structure.size, structure.size))
-        for first in range(0, self.omega.size, BLOCK):
-            part = slice(first, first + BLOCK)
-            model = response_of(structure, likely.theta, self.omega[part]) / sigma[part]
-            rows = stacked(model[:, None] * log_jacobian(structure, likely.theta, self.omega[part]))
-            curvature += rows @ rows.T
+        curvature = information(structure, likely.theta, self.omega, sigma)
         scale = 1 / np.sqrt(np.diag(curvature))
         values, vectors = np.linalg.eigh(curvature * scale[:, None] * scale)
         if not values[0] > SINGULAR:

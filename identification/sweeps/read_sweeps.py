@@ -112,7 +112,8 @@ def _from_response(table: Table, name: str) -> FrequencyResponse:
     _check_numbers(table)
     frequency = next(iter(table.columns))
     values = table.columns[frequency]
-    table.refuse_any(values < 1 / LARGEST, frequency, f"a positive number, {1 / LARGEST:g} or more")
+    table.refuse_any(values <= 0, frequency, "a positive number")
+    table.refuse_any(values < 1 / LARGEST, frequency, f"{1 / LARGEST:g} or more")
     _check_order(table, frequency)
     if values.size < FEWEST_LINES:
         table.refuse(f"holds {values.size} frequencies; expected {FEWEST_LINES} or more")

@@ -19,7 +19,7 @@ from identification.fitting import grouped_lines
 from identification.fitting.first_guess import group_delay
 from identification.fitting.fit_plant import fit_plant
 from identification.fitting.grouped_lines import grouped
-from identification.fitting.least_squares import BLOCK, _normal_at, log_jacobian, response_of
+from identification.fitting.least_squares import BLOCK, _normal_at, information, log_jacobian, response_of
 from identification.fitting.likelihood import noise_levels
 from identification.formats import mat_structure, sizes
 from identification.formats.csv_file import read_csv
@@ -86,7 +86,8 @@ def test_blocks_of_lines_are_added() -> None:
     cost, slope, curvature = _normal_at(theta, (1, 1, 1, 0, 0), omega, response, sigma, False)
     assert cost == pytest.approx(np.sum(np.abs(residual) ** 2))
     np.testing.assert_allclose(slope, (rows.conj().T @ residual).real, rtol=1e-9, atol=1e-9 * cost)
-    np.testing.assert_allclose(curvature, (rows.conj().T @ rows).real, rtol=1e-9, atol=1e-9 * cost)
+    for found in (curvature, information(structure, theta, omega, sigma)):
+        np.testing.assert_allclose(found, (rows.conj().T @ rows).real, rtol=1e-9, atol=1e-9 * cost)
 
 
 @pytest.mark.parametrize("soft", [False, True])
