@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from experiments.campaign.seal import SEAL, Seal
 from identification.base.errors import InputError, MissingFile
 
 RUNS = ("none", "thesis", "corrected")
@@ -19,6 +21,7 @@ BINS = 10  # of the distance
 OUTCOMES = ("linear_stable", "diverged", "recovered", "covered")
 
 ROWS = 65536  # that are held at a time
+MOST_SAID = 200  # characters of what Arrow says
 DIGIT = 8  # bits of the quantiles that one reading of the file settles
 
 # The type that each column is read as; the measures may have empty cells.
@@ -69,6 +72,7 @@ def campaign_tables(path: Path) -> dict[str, pd.DataFrame]:
     plants, that of share p is the ceil(p n)-th.
     """
     facts = _facts(path)
+    _require_sealed(path)
     counts, sectors, worst = _count(path, facts["plants"])
     steps = np.arange(1, STEPS + 1)
     values = _order_statistics(path, -(-steps * facts["plants"] // STEPS) - 1)
@@ -94,16 +98,33 @@ def campaign_tables(path: Path) -> dict[str, pd.DataFrame]:
     }
 
 
+@contextmanager
+def _reading(path: Path) -> Iterator[Any]:
+    """The file, open; a damaged one makes Arrow raise whatever it comes upon: its own errors, wrong text, no memory."""
+    from pyarrow import parquet
+
+    if not path.is_file():
+        raise MissingFile(f"{path}: no such file")
+    try:
+        yield parquet.ParquetFile(path)
+    except InputError:
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"{path}: cannot be read ({reason[:MOST_SAID]}); expected the file of a campaign") from None
+
+
 def _facts(path: Path) -> dict[str, Any]:
     """What the file says of the whole campaign, once its columns are there."""
-    schema = _open(path).schema_arrow
-    missing = [name for name in COLUMNS if name not in schema.names]
+    with _reading(path) as file:
+        names, said = file.schema_arrow.names, file.schema_arrow.metadata or {}
+    missing = [name for name in COLUMNS if name not in names]
     if missing:
         raise InputError(f"{path}: no column {missing[0]}; expected the file of a campaign, with {', '.join(COLUMNS)}")
-    twice = [name for name in COLUMNS if schema.names.count(name) > 1]
+    twice = [name for name in COLUMNS if names.count(name) > 1]
     if twice:
-        raise InputError(f"{path}: holds the column {twice[0]} {schema.names.count(twice[0])} times; expected it once")
-    said, facts = schema.metadata or {}, {}
+        raise InputError(f"{path}: holds the column {twice[0]} {names.count(twice[0])} times; expected it once")
+    facts = {}
     for name, kind in FACTS.items():
         try:
             facts[name] = kind(said[name.encode()])
@@ -117,24 +138,22 @@ def _facts(path: Path) -> dict[str, Any]:
     return facts
 
 
-def _open(path: Path) -> Any:
-    import pyarrow
-    from pyarrow import parquet
-
-    if not path.is_file():
-        raise MissingFile(f"{path}: no such file")
-    try:
-        return parquet.ParquetFile(path)
-    except (pyarrow.ArrowException, OSError):
-        raise InputError(f"{path}: not a parquet file, or not a whole one; expected that of a campaign") from None
+def _require_sealed(path: Path) -> None:
+    """Refuse a file whose rows and metadata are not those that were written, see :mod:`experiments.campaign.seal`."""
+    with _reading(path) as file:
+        seal = Seal(file.schema_arrow)
+        for batch in file.iter_batches(batch_size=ROWS):
+            seal.update(batch)
+        said = (file.schema_arrow.metadata or {}).get(SEAL.encode(), b"").decode()
+    if said != str(seal):
+        raise InputError(
+            f"{path}: is not as it was written, by its {SEAL}; expected the file of a campaign, run it again"
+        )
 
 
 def _read(path: Path) -> Iterator[Columns]:
     """The columns, a piece at a time: ``run`` counts in RUNS, and what diverges or never recovers is infinite."""
-    import pyarrow
-
-    file = _open(path)
-    try:
+    with _reading(path) as file:
         for batch in file.iter_batches(batch_size=ROWS, columns=list(COLUMNS)):
             piece = {}
             for name, kind in COLUMNS.items():
@@ -143,10 +162,6 @@ def _read(path: Path) -> Iterator[Columns]:
                     raise InputError(f"{path}: {name} has an empty cell; expected none")
                 piece[name] = cells.cast(kind).to_numpy(zero_copy_only=False)
             yield _checked(path, piece)
-    except pyarrow.ArrowException as error:
-        raise InputError(
-            f"{path}: cannot be read ({str(error).splitlines()[0]}); expected the file of a campaign"
-        ) from None
 
 
 def _checked(path: Path, piece: Columns) -> Columns:

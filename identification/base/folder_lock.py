@@ -66,6 +66,8 @@ def _held(lock: Path, target: Path) -> Iterator[None]:
     """
     from filelock import FileLock, Timeout
 
+    if not lock.parent.is_dir():
+        raise InputError(f"{target.parent}: no such folder")
     holder = FileLock(lock, timeout=0)
     try:
         holder.acquire()
