@@ -17,13 +17,15 @@ endif
 SETS ?= 200
 CASES ?= 200
 SEED ?= 1
+TIMES ?= 5
 
 PY := .venv/bin/python
 READY := .venv/.ready
 BENCH_READY := .venv/.bench-ready
+AUDIT_READY := .venv/.audit-ready
 
 # Values go to Python by the environment, as they were given: neither make nor the shell reads a name in them.
-GIVEN := SWEEPS MODEL FIT LIMIT PLANTS JOBS ONLY REPORT FORCE BUILD OUT SETS CASES SEED
+GIVEN := SWEEPS MODEL FIT LIMIT PLANTS JOBS ONLY REPORT FORCE BUILD OUT SETS CASES SEED TIMES
 unexport $(GIVEN)
 define hand
 export ANTIWINDUP_$(1) := $$(value $(1))
@@ -32,7 +34,7 @@ $(foreach name,$(filter-out BUILD OUT,$(GIVEN)),$(eval $(call hand,$(name))))
 figures report: export ANTIWINDUP_OUTPUT := $(value BUILD)
 refit: export ANTIWINDUP_OUTPUT := $(value OUT)
 
-.PHONY: help figures report refit claims test bench study referee lint clean
+.PHONY: help figures report refit claims test bench study referee fuzz faults audit lint clean
 help: ## say what there is
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 	@echo
@@ -61,6 +63,12 @@ study: $(READY) ## fit hundreds of synthetic sets: success, distance from the Cr
 	$(PY) benchmarks/identification_study.py --sets="$$ANTIWINDUP_SETS"
 referee: $(READY) ## compare CASES random cases of SEED with independent numerics, all that is said of them
 	$(PY) -m benchmarks.referee --cases="$$ANTIWINDUP_CASES" --seed="$$ANTIWINDUP_SEED"
+faults: $(READY) ## interrupt, kill, starve and double the commands TIMES times each with SEED; measure large inputs
+	$(PY) -m benchmarks.interrupts --times="$$ANTIWINDUP_TIMES" --seed="$$ANTIWINDUP_SEED"
+	$(PY) -m benchmarks.faults --times="$$ANTIWINDUP_TIMES" --seed="$$ANTIWINDUP_SEED"
+	$(PY) -m benchmarks.size_study
+audit: $(AUDIT_READY) ## look the locked packages up in the database of known vulnerabilities (needs the network)
+	.venv/bin/pip-audit --strict --disable-pip --requirement requirements.lock --requirement requirements-bench.lock
 lint: $(READY) ## check style and types
 	.venv/bin/ruff check --quiet .
 	.venv/bin/ruff format --quiet --check .
@@ -76,7 +84,7 @@ $(READY): requirements.lock pyproject.toml
 	$(PY) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --no-index --editable .
 	@touch $@
 
-# What `make bench` needs beyond that.
-$(BENCH_READY): requirements-bench.lock $(READY)
-	$(PY) -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements-bench.lock
+# What `make bench` and `make audit` need beyond that.
+$(BENCH_READY) $(AUDIT_READY): .venv/.%-ready: requirements-%.lock $(READY)
+	$(PY) -m pip install --quiet --disable-pip-version-check --require-hashes --requirement $<
 	@touch $@

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import click
 import numpy as np
+import pyarrow
 
 from benchmarks.fuzz import seeds
 from benchmarks.fuzz.mutations import NUMBERS, WORDS, changed
@@ -175,7 +176,7 @@ def campaigns(rng: random.Random, cheap: bool) -> Case:
             table = table.drop(columns=table.columns[column])
         try:
             damaged = seeds.as_parquet(table.infer_objects())
-        except (ValueError, TypeError, OverflowError):  # no parquet file holds that
+        except (ValueError, TypeError, OverflowError, pyarrow.ArrowException):  # no file of a campaign holds that
             damaged = changed(seeds.campaigns()["raw.parquet"], ".parquet", rng)
     return Case(
         ("experiments", "campaign-tables", "campaign.parquet", "--output", "out"), {"campaign.parquet": damaged}
@@ -186,7 +187,8 @@ def options(rng: random.Random, cheap: bool) -> Case:
     """Any command of any room with options that are right, odd, missing or given twice."""
     left_out = {*LONG, *(COSTLY if cheap else ())}
     words, command = rng.choice([each for each in commands() if each[0][-1] not in left_out])
-    odd = rng.choice([each for each in command.params if not isinstance(each.type, click.Path)] or command.params)
+    numbers = [each for each in command.params if not isinstance(each.type, click.Path | click.types.BoolParamType)]
+    odd = rng.choice(numbers or command.params)
     arguments = list(words)
     for each in command.params:
         if rng.random() < (0.02 if each.required else 0.7) and each is not odd:

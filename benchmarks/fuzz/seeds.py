@@ -19,6 +19,7 @@ from data.thesis import model_named
 from design.chapter_2.design_delay_free import design_delay_free
 from design.chapters_3_4.design_extended import design_extended
 from experiments.campaign.distributions import RUNS
+from experiments.campaign.seal import SEAL, Seal
 from identification.fit_model import fit_model
 from identification.model.plant import Mode, PlantModel
 from identification.model.structure import Wanted
@@ -121,9 +122,13 @@ def campaign_table(count: int = 8) -> pd.DataFrame:
 
 
 def as_parquet(table: pd.DataFrame, **options: str) -> bytes:
-    """The file of a campaign."""
+    """The file of a campaign, sealed whatever its rows are."""
     facts = {"plants": "8", "seed": "7", "limit": "12.5", "horizon_s": "25"}
     content = pyarrow.Table.from_pandas(table, preserve_index=False).replace_schema_metadata(facts)
+    seal = Seal(content.schema)
+    for batch in content.to_batches():
+        seal.update(batch)
+    content = content.replace_schema_metadata(facts | {SEAL: str(seal)})
     written = io.BytesIO()
     parquet.write_table(content, written, **options)
     return written.getvalue()

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 from contextlib import suppress
 from dataclasses import asdict
+from hashlib import sha256
 from importlib.metadata import version
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import click
+
 from experiments.campaign.run_plants import CHUNK, Campaign, Columns
+from experiments.campaign.seal import SEAL, Seal
 from identification.base.errors import InputError
-from identification.base.files import read_text, write_whole
+from identification.base.files import read_bytes, read_text, write_whole
 
 MANIFEST = "manifest.json"
 PARTIAL = ".partial-"  # of a command that was killed while it wrote
-RUNS = 3  # a plant
+PART = re.compile(r"part-(\d+)-[0-9a-f]{64}\.parquet")
 PARTS_A_GROUP = 80  # of the file's row groups: 6000 rows
 SYNTHETIC = "plants drawn at random inside W_a, not measured"
 PACKAGES = ("antiwindup-thesis", "numpy", "scipy", "numba", "pyarrow")
@@ -44,15 +51,14 @@ class CampaignFile:
 
     Notes
     -----
-    Each part is written whole, so that what is there is good, however the command ended. A campaign is the same if
-    its manifest is: design, seed, number of plants, reference, limit, length, chunk, the code of this package and the
-    versions of the others that compute.
+    A campaign is the same if its manifest is: design, seed, number of plants, reference, limit, length, chunk, the
+    code of this package and the versions of the others that compute. The name of a part holds the hash of that
+    manifest and of the part's content together, so that what is read is whole and of this campaign, or is run again.
     """
 
     def __init__(self, output: Path, campaign: Campaign, plants: int, source: Path) -> None:
         self.output, self.folder = output, output.with_name(f"{output.name}.parts")
-        chunks = [(first, min(first + CHUNK, plants)) for first in range(0, plants, CHUNK)]
-        self._parts = {chunk: self.folder / f"part-{chunk[0] // CHUNK:06d}.parquet" for chunk in chunks}
+        self._plants = plants
         self._facts = {
             "synthetic": SYNTHETIC,
             "kind": campaign.design.kind,
@@ -66,25 +72,25 @@ class CampaignFile:
             "code_sha256": campaign.code_sha256,
             "versions": {name: version(name) for name in PACKAGES},
         }
+        self._manifest = json.dumps(self._facts, indent=2) + "\n"
         self._metadata = {name: str(self._facts[name]) for name in TOLD} | {
             "design": source.name,
             "version": str(version(PACKAGES[0])),
         }
-        if output.resolve() == source.resolve():
+        if os.path.realpath(output) == os.path.realpath(source):
             raise InputError(f"{output}: is an input too; expected another file to write")
         if output.exists() and not output.is_file():
             raise InputError(f"{output}: cannot be written; expected a file, found something else")
-        if not output.parent.is_dir():
-            raise InputError(f"{output.parent}: no such folder")
-        if self.folder.is_dir() and all(path.name.startswith(PARTIAL) for path in self.folder.iterdir()):
-            return
+        self._parts: dict[int, Path] = {}
         if self.folder.exists():
             self._require_the_same()
+            self._find_parts()
 
     @property
     def missing(self) -> list[tuple[int, int]]:
         """The chunks of which there is no part that is whole, see :func:`experiments.campaign.run_plants.run_chunk`."""
-        return [chunk for chunk, part in self._parts.items() if not _is_whole(part, chunk)]
+        firsts = (first for first in range(0, self._plants, CHUNK) if first // CHUNK not in self._parts)
+        return [(first, min(first + CHUNK, self._plants)) for first in firsts]
 
     def keep(self, chunk: tuple[int, int], columns: Columns) -> None:
         """Write the part of one chunk."""
@@ -92,40 +98,74 @@ class CampaignFile:
 
         if not (self.folder / MANIFEST).exists():
             self._begin()
-        table = _table(columns)
-        write_whole({self._parts[chunk]: lambda partial: parquet.write_table(table, partial)})
+        buffer = BytesIO()
+        parquet.write_table(_table(columns), buffer)
+        content, number = buffer.getvalue(), chunk[0] // CHUNK
+        part = self.folder / self._name(number, content)
+        write_whole({part: lambda partial: partial.write_bytes(content)})
+        self._parts[number] = part
 
     def finish(self) -> None:
         """Put all parts into the file, in the order of the plants, PARTS_A_GROUP at a time, and remove them."""
         write_whole({self.output: self._join})
-        for path in [*self._parts.values(), self.folder / MANIFEST, *self.folder.glob(f"{PARTIAL}*")]:
+        for path in [*self._parts.values(), self.folder / MANIFEST]:
             path.unlink(missing_ok=True)
-        with suppress(OSError):  # what is not ours in it stays
+        with suppress(OSError):
             self.folder.rmdir()
+        if self.folder.exists():
+            left = min(path.name for path in self.folder.iterdir())
+            click.echo(f"{self.folder} stays, since it holds {left}, which is no part of the campaign", err=True)
 
     def _join(self, partial: Path) -> None:
         import pyarrow
         from pyarrow import parquet
 
-        parts = list(self._parts.values())
-        schema = _read(parts[0]).schema.with_metadata(self._metadata)
+        numbers = range(len(self._parts))
+        groups = [numbers[first : first + PARTS_A_GROUP] for first in numbers[::PARTS_A_GROUP]]
+        schema = self._read(0).schema.with_metadata(self._metadata)
+        seal = Seal(schema)
+        for group in groups:
+            for number in group:
+                for batch in self._read(number).to_batches():
+                    seal.update(batch)
+        schema = schema.with_metadata(self._metadata | {SEAL: str(seal)})
         with parquet.ParquetWriter(partial, schema) as writer:
-            for first in range(0, len(parts), PARTS_A_GROUP):
-                tables = [_read(part) for part in parts[first : first + PARTS_A_GROUP]]
-                writer.write_table(pyarrow.concat_tables(tables).cast(schema))
+            for group in groups:
+                writer.write_table(pyarrow.concat_tables(map(self._read, group)).cast(schema))
+
+    def _read(self, number: int) -> Any:
+        from pyarrow import parquet
+
+        path = self._parts[number]
+        content = read_bytes(path)
+        if path.name != self._name(number, content):
+            raise InputError(f"{path}: has been changed meanwhile; give the same command to run this part again")
+        return parquet.read_table(BytesIO(content))
+
+    def _name(self, number: int, content: bytes) -> str:
+        return f"part-{number:06d}-{sha256(self._manifest.encode() + content).hexdigest()}.parquet"
+
+    def _find_parts(self) -> None:
+        for path in self.folder.iterdir():
+            found = PART.fullmatch(path.name)
+            with suppress(OSError):  # what cannot be read is run again
+                if found and path.name == self._name(int(found[1]), path.read_bytes()):
+                    self._parts[int(found[1])] = path
 
     def _begin(self) -> None:
-        text = json.dumps(self._facts, indent=2) + "\n"
         try:
             self.folder.mkdir(exist_ok=True)
         except OSError as error:
             raise InputError(f"{self.folder}: cannot be made ({error.strerror})") from None
-        write_whole({self.folder / MANIFEST: lambda partial: partial.write_text(text, encoding="utf-8")})
+        write_whole({self.folder / MANIFEST: lambda partial: partial.write_text(self._manifest, encoding="utf-8")})
 
     def _require_the_same(self) -> None:
-        manifest = self.folder / MANIFEST
+        if not (self.folder.is_dir() and os.access(self.folder, os.W_OK | os.X_OK)):
+            raise InputError(f"{self.folder}: cannot be written; expected a folder that may be written to, or none")
+        if all(path.name.startswith(PARTIAL) for path in self.folder.iterdir()):
+            return
         try:
-            found = json.loads(read_text(manifest))
+            found = json.loads(read_text(self.folder / MANIFEST))
         except ValueError:
             found = None
         if not isinstance(found, dict):
@@ -153,25 +193,3 @@ def _table(columns: Columns) -> Any:
     kinds |= {name: pyarrow.int64() for name in WHOLE} | {name: pyarrow.bool_() for name in FLAGS}
     schema = pyarrow.schema([(name, kinds.get(name, pyarrow.float64())) for name in columns])
     return pyarrow.table(columns, schema=schema)
-
-
-def _is_whole(part: Path, chunk: tuple[int, int]) -> bool:
-    import pyarrow
-    from pyarrow import parquet
-
-    try:
-        return bool(parquet.read_metadata(part).num_rows == RUNS * (chunk[1] - chunk[0]))
-    except (pyarrow.ArrowException, OSError):
-        return False
-
-
-def _read(part: Path) -> Any:
-    import pyarrow
-    from pyarrow import parquet
-
-    try:
-        return parquet.read_table(part)
-    except (pyarrow.ArrowException, OSError):
-        raise InputError(
-            f"{part}: cannot be read; expected a part of the campaign, remove it to run it again"
-        ) from None

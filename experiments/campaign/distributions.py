@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from experiments.campaign.seal import SEAL, Seal
 from identification.base.errors import InputError
 from identification.base.files import require_readable
 
@@ -72,6 +73,7 @@ def campaign_tables(path: Path) -> dict[str, pd.DataFrame]:
     plants, that of share p is the ceil(p n)-th.
     """
     facts = _facts(path)
+    _require_sealed(path)
     counts, sectors, worst = _count(path, facts["plants"])
     steps = np.arange(1, STEPS + 1)
     values = _order_statistics(path, -(-steps * facts["plants"] // STEPS) - 1)
@@ -135,6 +137,19 @@ def _facts(path: Path) -> dict[str, Any]:
     if facts["plants"] < 1:
         raise InputError(f"{path}: no plants; expected at least one")
     return facts
+
+
+def _require_sealed(path: Path) -> None:
+    """Refuse a file whose rows and metadata are not those that were written, see :mod:`experiments.campaign.seal`."""
+    with _reading(path) as file:
+        seal = Seal(file.schema_arrow)
+        for batch in file.iter_batches(batch_size=ROWS):
+            seal.update(batch)
+        said = (file.schema_arrow.metadata or {}).get(SEAL.encode(), b"").decode()
+    if said != str(seal):
+        raise InputError(
+            f"{path}: is not as it was written, by its {SEAL}; expected the file of a campaign, run it again"
+        )
 
 
 def _read(path: Path) -> Iterator[Columns]:

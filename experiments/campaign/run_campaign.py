@@ -12,13 +12,14 @@ from tqdm import tqdm
 
 from design.design_file import Design
 from experiments.campaign.checkpoint import CampaignFile
-from experiments.campaign.distributions import PERCENT, campaign_tables
+from experiments.campaign.distributions import PERCENT, RUNS, campaign_tables
 from experiments.campaign.run_plants import Campaign, code_sha256
 from experiments.campaign.workers import run_here, run_on_cluster
 from experiments.runs.guarantee import sector_text
 from experiments.runs.references import Reference
 from identification.base.errors import InputError
 from identification.base.files import read_bytes
+from identification.base.folder_lock import locked_file
 
 MOST_PLANTS = 10**9
 
@@ -60,30 +61,38 @@ def run_campaign(
         )
     digest = hashlib.sha256(read_bytes(design)).hexdigest()
     campaign = Campaign(content, digest, seed, reference, limit, periods, code_sha256())
-    file = CampaignFile(output, campaign, plants, design)
-    missing = file.missing
-    left = sum(last - first for first, last in missing)
-    if left < plants:
-        click.echo(f"{plants - left} of {plants} plants are there already", err=True)
-    if missing:
-        done = run_here(campaign, missing) if scheduler is None else run_on_cluster(campaign, missing, scheduler)
-        try:
-            with tqdm(total=plants, initial=plants - left, desc="campaign", unit=" plants", disable=None) as bar:
-                for chunk, columns in done:
-                    file.keep(chunk, columns)
-                    bar.update(chunk[1] - chunk[0])
-        except KeyboardInterrupt:
-            kept = plants - sum(last - first for first, last in file.missing)
-            click.echo(f"{kept} of {plants} plants are kept in {file.folder}; the same command goes on", err=True)
-            raise
-        finally:
-            done.close()
-    file.finish()
+    with locked_file(output):
+        _complete(CampaignFile(output, campaign, plants, design), campaign, plants, scheduler)
     summary = campaign_tables(output)["campaign_summary"]
     click.echo(_promised(summary))
     click.echo(f"{plants} plants within W_a -> {output}; limits +-{limit:.6g}, {campaign.horizon_s:.6g} s each")
     for line in _lines(summary):
         click.echo(line)
+
+
+def _complete(file: CampaignFile, campaign: Campaign, plants: int, scheduler: str | None) -> None:
+    """Run what is missing, and write the file."""
+    missing = file.missing
+    left = sum(last - first for first, last in missing)
+    if left < plants:
+        click.echo(f"{plants - left} of {plants} plants are there already", err=True)
+    if missing:
+        runs = f"{left} plants, {len(RUNS)} runs of {campaign.horizon_s:.6g} s each"
+        click.echo(f"{runs}; what is done is kept in {file.folder}", err=True)
+        done = run_here(campaign, missing) if scheduler is None else run_on_cluster(campaign, missing, scheduler)
+        try:
+            with tqdm(total=plants, initial=plants - left, desc="campaign", unit=" plants", disable=None) as bar:
+                for chunk, columns in done:
+                    file.keep(chunk, columns)
+                    left -= chunk[1] - chunk[0]
+                    bar.update(chunk[1] - chunk[0])
+        except KeyboardInterrupt:
+            kept = f"{plants - left} of {plants} plants are kept in {file.folder}"
+            click.echo(f"{kept}; the same command goes on", err=True)
+            raise
+        finally:
+            done.close()
+    file.finish()
 
 
 def _promised(summary: pd.DataFrame) -> str:

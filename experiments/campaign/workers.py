@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -80,8 +81,17 @@ def run_on_cluster(campaign: Campaign, chunks: Sequence[Chunk], address: str) ->
 
     Notes
     -----
-    What ran on a worker that dies runs again on another one. The cluster may grow and shrink.
+    What ran on a worker that dies runs again on another one. The cluster may grow and shrink. Dask's own log is
+    silenced meanwhile: what goes wrong is one sentence.
     """
+    logging.disable()
+    try:
+        yield from _run_on(address, campaign, chunks)
+    finally:
+        logging.disable(logging.NOTSET)
+
+
+def _run_on(address: str, campaign: Campaign, chunks: Sequence[Chunk]) -> Done:
     from distributed import CancelledError, Client, as_completed
     from distributed.scheduler import KilledWorker, NoValidWorkerError
 

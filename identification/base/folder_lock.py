@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from identification.base.errors import InputError
-from identification.base.files import is_there, removed_at_the_end
+from identification.base.files import is_folder, is_there, removed_at_the_end
 
 
 @contextmanager
@@ -66,6 +66,8 @@ def _held(lock: Path, target: Path) -> Iterator[None]:
     """
     from filelock import FileLock, Timeout
 
+    if not is_folder(lock.parent):
+        raise InputError(f"{target.parent}: no such folder")
     holder = FileLock(lock, timeout=0)
     try:
         holder.acquire()

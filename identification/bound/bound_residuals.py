@@ -13,7 +13,7 @@ from identification.bound.envelope import WIDTH, envelope_of
 from identification.bound.tightest_bound import Points, resonances, shares, tightest
 from identification.model.plant import HIGHEST_ORDER, AdditiveBound, PlantModel
 from identification.model.reports import BoundReport, Excess, Touch
-from identification.sweeps.response import FrequencyResponse
+from identification.sweeps.response import FrequencyResponse, require_one_band
 
 GRID = 1000  # frequencies, equal in logarithm, that are looked at besides the lines
 ROUNDING = 1e-12  # of the plant: two models that differ by less do not differ
@@ -126,6 +126,7 @@ def bound_residuals(
 def _refuse(tests: Sequence[FrequencyResponse], models: Sequence[PlantModel] | None, order: int) -> None:
     if order not in range(1, HIGHEST_ORDER + 1):
         raise InputError(f"the order of the bound is {order}; expected an integer from 1 to {HIGHEST_ORDER}")
+    require_one_band(tests)
     lines = np.unique(np.concatenate([test.omega for test in tests])).size
     if lines < 4 * order:
         raise InputError(f"the tests have {lines} lines; expected {4 * order} or more for a bound of order {order}")

@@ -13,6 +13,7 @@ from identification.model.structure import Structure
 ITERATIONS = 8
 UNTHREADED = 100_000  # multiplications of a matrix product; threads cost more than they bring at this size
 BOUNDS = (1e-5, 10.0)  # of a mode's damping ratio
+MOST_DELAYS = 100_000  # dead times that are told apart: lines very unevenly apart could tell more
 BAND = 10.0  # modes are sought up to this factor outside the band
 
 
@@ -29,7 +30,7 @@ def group_delay(omega: Real, response: Complex) -> float:
     increment = np.angle(response[1:] * response[:-1].conj())
     finest = 0.25 / np.max(step)
     # A median increment over pi is an alias: so the usual step bounds the delays that can be told apart.
-    delays = np.arange(0.0, np.pi / np.quantile(step, 0.1), finest)
+    delays = np.arange(0.0, min(np.pi / np.quantile(step, 0.1), MOST_DELAYS * finest), finest)
     votes = np.zeros(delays.size)
     for block in np.array_split(np.arange(delays.size), 1 + delays.size * step.size // 500_000):
         votes[block] = np.cos(increment + delays[block, None] * step).sum(axis=1)

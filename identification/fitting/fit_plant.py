@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.base.errors import InputError
+from identification.fitting.grouped_lines import grouped
 from identification.fitting.nominal_plant import Nominal, nominal_of
 from identification.fitting.single_test_fit import OneFit, ScaledTest, Undetermined
 from identification.fitting.structure_selection import Selection
 from identification.model.plant import PlantModel
 from identification.model.structure import Structure, Wanted
-from identification.sweeps.response import FrequencyResponse
+from identification.sweeps.response import FrequencyResponse, require_one_band
 
 CORRELATED = 0.3  # correlation of neighbouring residuals above which a fit may have missed something
 
@@ -92,13 +93,22 @@ def fit_plant(
     Each test is fitted on its own first; how they become one plant,
     :func:`identification.fitting.nominal_plant.nominal_of` says.
 
+    Of very many lines groups stand for them until the structure is chosen, see
+    :func:`identification.fitting.grouped_lines.grouped`; the plant is that of all lines.
+
     A held record's response has the aliases of the plant on it. They are computed from the parameters and taken away,
     in turn with the fit.
     """
     if not tests:
         raise InputError("no test was given; expected one or more sweeps")
+    require_one_band(tests)
     wanted = wanted or Wanted()
-    selection = Selection([ScaledTest(test, soft) for test in tests], wanted, tick)
+    groups = [grouped(test) for test in tests]
+    selection = Selection([ScaledTest(group, soft) for group in groups], wanted, tick)
+    whole = [
+        few if group is test else ScaledTest(test, soft)
+        for test, group, few in zip(tests, groups, selection.tests, strict=True)
+    ]
     best = selection.search()
     rng = np.random.default_rng(seed)
     pairs = list(zip(selection.tests, selection.fits[best], strict=True))
@@ -111,10 +121,13 @@ def fit_plant(
     simpler = [s for s in criterion if s.size < best.size]
     for structure in [best, *sorted(simpler, key=criterion.__getitem__)]:
         try:
-            fits = [test.finish(fit) for test, fit in zip(selection.tests, selection.fits[structure], strict=True)]
+            fits = [
+                test.finish(fit if test is few else test.taken_over(few, fit))
+                for test, few, fit in zip(whole, selection.tests, selection.fits[structure], strict=True)
+            ]
         except Undetermined as error:
             undetermined = error
             continue
-        nominal = nominal_of(selection.tests, fits)
+        nominal = nominal_of(whole, fits)
         return FitResult(nominal, tuple(fits), criterion, selection.overdispersion, soft)
     raise undetermined

@@ -9,6 +9,7 @@ from identification.base.compiled import njit
 from identification.model.structure import Structure
 
 EVALUATIONS = 30
+BLOCK = 32768  # lines whose derivatives are held at a time
 
 
 def response_of(structure: Structure, theta: Real, omega: Real) -> Complex:
@@ -58,6 +59,17 @@ def stacked(columns: Complex) -> Real:
     return np.ascontiguousarray(columns.T).view(float)
 
 
+def information(structure: Structure, theta: Real, omega: Real, sigma: Real) -> Real:
+    """Products (p, p) of the derivatives of :func:`response_of` over sigma (M,), summed over the lines."""
+    total = np.zeros((structure.size, structure.size))
+    for first in range(0, omega.size, BLOCK):
+        part = slice(first, first + BLOCK)
+        model = response_of(structure, theta, omega[part]) / sigma[part]
+        rows = stacked(model[:, None] * log_jacobian(structure, theta, omega[part]))
+        total += rows @ rows.T
+    return total
+
+
 def least_squares(
     structure: Structure,
     theta: Real,
@@ -75,6 +87,21 @@ def least_squares(
     """
     counts = (structure.integrators, *structure.modes, *structure.real)
     return np.asarray(_least_squares(theta, counts, omega, response, sigma, *bounds, soft, tolerance))
+
+
+@njit()
+def _normal_at(theta, counts, omega, response, sigma, soft):  # type: ignore[no-untyped-def]
+    """What :func:`_normal` gives at theta, BLOCK lines at a time."""
+    integrators, zero_modes, pole_modes, real_zeros, real_poles = counts
+    cost, slope, curvature = 0.0, np.zeros(theta.size), np.zeros((theta.size, theta.size))
+    for first in range(0, omega.size, BLOCK):
+        last = first + BLOCK
+        value, logs = _derive(
+            theta, integrators, zero_modes, pole_modes, real_zeros, real_poles, omega[first:last], True
+        )
+        more = _normal(value, logs, response[first:last], sigma[first:last], soft)
+        cost, slope, curvature = cost + more[0], slope + more[1], curvature + more[2]
+    return cost, slope, curvature
 
 
 @njit()
@@ -134,9 +161,7 @@ def _least_squares(theta, counts, omega, response, sigma, lower, upper, soft, to
     The normal equations of a few scaled parameters are solved: singular values of 2M rows, as
     scipy.optimize.least_squares takes them, cost ten times the rest.
     """
-    integrators, zero_modes, pole_modes, real_zeros, real_poles = counts
-    value, logs = _derive(theta, integrators, zero_modes, pole_modes, real_zeros, real_poles, omega, True)
-    cost, slope, curvature = _normal(value, logs, response, sigma, soft)
+    cost, slope, curvature = _normal_at(theta, counts, omega, response, sigma, soft)
     damping, scale = 1e-3, np.zeros(theta.size)
     for _ in range(EVALUATIONS):
         scale = np.maximum(scale, np.diag(curvature))
@@ -154,8 +179,7 @@ def _least_squares(theta, counts, omega, response, sigma, lower, upper, soft, to
             if solved:
                 moved[free] += step / unit
             moved = np.minimum(np.maximum(moved, lower), upper)
-            value, logs = _derive(moved, integrators, zero_modes, pole_modes, real_zeros, real_poles, omega, True)
-            reached, moved_slope, moved_curvature = _normal(value, logs, response, sigma, soft)
+            reached, moved_slope, moved_curvature = _normal_at(moved, counts, omega, response, sigma, soft)
             if solved and reached < cost:
                 break
             damping *= 8

@@ -19,6 +19,7 @@ RATIOS = 20.0  # of floor and relative error at the median response: logarithm o
 GAIN = 20.0  # the gain is sought up to this factor's logarithm from the one that fits the guess
 CLOSEST = 1e-8  # no relative error below this is believed: files do not carry more digits
 NEWTON = 12  # steps for the scale of soft-L1 errors
+HELD = 500_000  # numbers of the grid's lines at a time
 
 
 @dataclass(frozen=True)
@@ -76,19 +77,25 @@ def noise_levels(error: Real, power: Real, excitation: Real, soft: bool = False)
     log_ratio, half_width = 0.0, RATIOS
     for points in (25, 9, 9):
         grid = log_ratio + np.linspace(-half_width, half_width, points)
-        shape = np.exp(grid)[:, None] + power / typical
-        scaled = q / shape
-        least = CLOSEST**2 * typical
-        factor = np.maximum(np.mean(scaled, axis=1), least)
-        if soft:
-            factor = _soft_factor(scaled, factor, least)
-        z = scaled / factor[:, None]
-        loss = 2 * z / (1 + np.sqrt(1 + z)) + np.log(1.5) if soft else z
-        deviance = 2 * np.sum(np.log(factor[:, None] * shape) + loss, axis=1)
+        parts = np.array_split(grid, min(points, 1 + points * power.size // HELD))
+        factor, deviance = np.concatenate([_deviances(part, q, power, typical, soft) for part in parts], axis=1)
         best = int(np.argmin(deviance))
         log_ratio, half_width = float(grid[best]), 2 * half_width / (points - 1)
     shared = 2 * float(np.sum(np.log(excitation)))
     return float(factor[best] * np.exp(log_ratio)), float(factor[best] / typical), float(deviance[best]) + shared
+
+
+def _deviances(grid: Real, q: Real, power: Real, typical: float, soft: bool) -> Real:
+    """The likeliest common factor and the deviance (2, G) for each of the logarithms (G,) of the ratio."""
+    shape = np.exp(grid)[:, None] + power / typical
+    scaled = q / shape
+    least = CLOSEST**2 * typical
+    factor = np.maximum(np.mean(scaled, axis=1), least)
+    if soft:
+        factor = _soft_factor(scaled, factor, least)
+    z = scaled / factor[:, None]
+    loss = 2 * z / (1 + np.sqrt(1 + z)) + np.log(1.5) if soft else z
+    return np.array([factor, 2 * np.sum(np.log(factor[:, None] * shape) + loss, axis=1)])
 
 
 def _soft_factor(scaled: Real, factor: Real, least: float) -> Real:

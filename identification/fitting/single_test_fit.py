@@ -10,7 +10,7 @@ import numpy as np
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
 from identification.fitting.first_guess import guesses
-from identification.fitting.least_squares import log_jacobian, response_of, stacked
+from identification.fitting.least_squares import information, response_of
 from identification.fitting.likelihood import Likely, Lines, maximise
 from identification.fitting.neighbouring_structures import grown
 from identification.model.plant import PlantModel
@@ -161,6 +161,11 @@ class ScaledTest:
         theta = self.to_scaled(theirs.structure, other.to_physical(theirs.structure, theirs.theta))
         return self._maximise(theirs.structure, theta, self._sigma(theirs))
 
+    def taken_over(self, other: ScaledTest, theirs: Likely) -> Likely:
+        """A fit of the same test at fewer lines, in this one's units; its deviance is that of the fewer."""
+        theta = self.to_scaled(theirs.structure, other.to_physical(theirs.structure, theirs.theta))
+        return replace(theirs, theta=theta, floor=theirs.floor * other.level / self.level)
+
     def as_well(self, mine: Likely, other: ScaledTest, theirs: Likely) -> bool:
         """Whether this test is explained as well as another one."""
         return mine.deviance / self.omega.size < theirs.deviance / other.omega.size + ALIKE
@@ -248,9 +253,7 @@ class ScaledTest:
     def _covariance(self, likely: Likely, spread: float) -> Real:
         """Covariance (p, p) of theta in physical units."""
         structure, sigma = likely.structure, self._sigma(likely)
-        model = response_of(structure, likely.theta, self.omega) / sigma
-        rows = stacked(model[:, None] * log_jacobian(structure, likely.theta, self.omega))
-        curvature = rows @ rows.T
+        curvature = information(structure, likely.theta, self.omega, sigma)
         scale = 1 / np.sqrt(np.diag(curvature))
         values, vectors = np.linalg.eigh(curvature * scale[:, None] * scale)
         if not values[0] > SINGULAR:

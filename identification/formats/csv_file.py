@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Sequence
+import sys
+from array import array
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ import numpy as np
 from identification.base.errors import InputError
 from identification.base.files import read_text
 from identification.formats.columns import Table, choose_columns, quoted, split_tests
+from identification.formats.sizes import require_size
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 
@@ -34,41 +37,55 @@ def read_columns(path: Path, choose: Callable[[str, list[str]], Sequence[str]]) 
     InputError
         The file cannot be read, lacks a column, or holds something that is no number.
     """
-    lines = read_text(path).lstrip("\ufeff").split("\n")
-    numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip()]
-    rows = [(n, line) for n, line in numbered if not line.startswith("#")]
-    if not rows:
+    require_size(path)
+    text = read_text(path).lstrip("\ufeff")
+    rows = ((n, line) for n, line in _lines(text) if not line.startswith("#"))
+    if (head := next(rows, None)) is None:
         raise InputError(f"{path}: holds no header and no numbers; expected a CSV with a header line")
-    place = f"{path}, line {rows[0][0]}"
-    separator = _separator(place, rows[0][1])
-    header = _fields(path, *rows[0], separator)
-    wanted = choose(place, header)
-    if len(rows) == 1:
-        raise InputError(f"{path}: holds a header and no numbers; expected a line for each point")
-    cells = [_fields(path, n, line, separator) for n, line in rows[1:]]
-    numbers = np.array([n for n, _ in rows[1:]])
-    for n, row in zip(numbers, cells, strict=True):
+    place = f"{path}, line {head[0]}"
+    separator = _separator(place, head[1])
+    header = _fields(path, *head, separator)
+    wanted = [(name, header.index(name), array("d")) for name in choose(place, header)]
+    test = header.index("test") if "test" in header else None
+    numbers, labels = array("q"), []
+    for n, line in rows:
+        row = _fields(path, n, line, separator)
         if len(row) != len(header):
             expected = f"{len(header)} as in the header"
             if separator == "," and len(row) > len(header):
                 expected += ", and decimals with a point"
             raise InputError(f"{path}, line {n}: holds {len(row)} fields; expected {expected}")
-    labels = [row[header.index("test")] for row in cells] if "test" in header else None
-    if labels is not None and "" in labels:
-        raise InputError(f"{path}, line {numbers[labels.index('')]}: test is ''; expected a number or a name")
-    columns = {}
-    for name in wanted:
-        texts = [row[header.index(name)] for row in cells]
-        columns[name] = np.array([_number(text) for text in texts])
-        bad = ~np.isfinite(columns[name])
-        if bad.any():
-            k = int(np.argmax(bad))
-            place = f"line {numbers[k]}" if labels is None else f"line {numbers[k]}, test {labels[k]}"
-            expected = "a finite number" + (" with a decimal point" if "," in texts[k] else "")
-            raise InputError(f"{path}, {place}: {name} is {quoted(texts[k])}; expected {expected}")
-    synthetic = any("SYNTHETIC" in line for _, line in numbered if line.startswith("#"))
-    table = Table(path, columns, numbers, in_lines=True, synthetic=synthetic)
-    return [table] if labels is None else split_tests(table, labels)
+        if test is not None and not row[test]:
+            raise InputError(f"{path}, line {n}: test is ''; expected a number or a name")
+        for name, column, values in wanted:
+            value = _number(row[column])
+            if not math.isfinite(value):
+                place = f"line {n}" if test is None else f"line {n}, test {row[test]}"
+                expected = "a finite number" + (" with a decimal point" if "," in row[column] else "")
+                raise InputError(f"{path}, {place}: {name} is {quoted(row[column])}; expected {expected}")
+            values.append(value)
+        numbers.append(n)
+        if test is not None:
+            labels.append(sys.intern(row[test]))
+    if not numbers:
+        raise InputError(f"{path}: holds a header and no numbers; expected a line for each point")
+    synthetic = any("SYNTHETIC" in line for _, line in _lines(text) if line.startswith("#"))
+    columns = {name: np.array(values) for name, _, values in wanted}
+    table = Table(path, columns, np.array(numbers), in_lines=True, synthetic=synthetic)
+    return [table] if test is None else split_tests(table, labels)
+
+
+def _lines(text: str) -> Iterator[tuple[int, str]]:
+    """The lines that are not blank, with their numbers from 1; a list of all would take more memory than the text."""
+    start, number = 0, 0
+    while start <= len(text):
+        stop = text.find("\n", start)
+        stop = len(text) if stop < 0 else stop
+        number += 1
+        line = text[start:stop]
+        if line.strip():
+            yield number, line
+        start = stop + 1
 
 
 def _separator(place: str, header: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,9 +18,11 @@ from identification.base.errors import InputError
 from identification.base.files import read_bytes
 from identification.formats.columns import COMPLEX, Table, choose_columns, quoted, split_tests
 from identification.formats.mat_structure import is_sound
+from identification.formats.sizes import require_bytes, require_size
 
 NUMERIC = {"double", "single", "logical"} | {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)}
 LABELS = NUMERIC | {"char", "cell"}
+NUMBER = 8  # bytes
 
 
 def read_mat(path: Path) -> list[Table]:
@@ -35,13 +38,17 @@ def read_mat(path: Path) -> list[Table]:
     InputError
         The file cannot be read, lacks a variable, or holds one of a wrong type or size.
     """
-    content = read_bytes(path)
-    classes = {name: kind for name, _, kind in _scipy(path, lambda: whosmat(str(path), appendmat=False))}
+    require_size(path)
+    headers = _scipy(path, lambda: whosmat(str(path), appendmat=False))
+    classes = {name: kind for name, _, kind in headers}
     usable = {name for name, kind in classes.items() if kind in (LABELS if name == "test" else NUMERIC)}
     names = [name if name in usable else f"{name} ({kind})" for name, kind in classes.items()]
     wanted = choose_columns(str(path), names, "variables", may_be_complex=True)
     with_labels = [*wanted, "test"] if "test" in usable else wanted
-    if not is_sound(content, with_labels):
+    for name, shape, _ in headers:
+        if name in with_labels:
+            require_bytes(f"{path}: {name} is {' x '.join(map(str, shape))},", NUMBER * math.prod(map(int, shape)))
+    if not is_sound(read_bytes(path), with_labels):
         raise InputError(f"{path}: is damaged; expected {', '.join(with_labels)} of numbers (or of text, test)")
     variables = _scipy(path, lambda: loadmat(str(path), appendmat=False, variable_names=with_labels))
     columns = {name: _numbers(path, name, variables[name]) for name in wanted}
@@ -94,7 +101,7 @@ def _numbers(path: Path, name: str, value: Array) -> Array:
     if value.ndim > 2:
         raise InputError(f"{path}: {name} is {_size(value)}; expected a vector or a matrix")
     value = value.ravel() if 1 in value.shape else value
-    return value.astype(complex if name == COMPLEX else float)
+    return value.astype(complex if name == COMPLEX else float, copy=False)
 
 
 def _labels(path: Path, value: Array, count: int) -> list[str]:

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import math
 import struct
+import zlib
 from collections.abc import Collection, Iterator
+from itertools import islice
+
+from identification.formats.sizes import MOST_BYTES
 
 HEADER = 128
+HEAD = 4096  # bytes of an array in which its name ends
+LARGEST = 16  # bytes of a number, a complex one
+MOST_CELLS = 2**25  # bytes; each of some millions of cells becomes an object
 MATRIX, COMPRESSED = 14, 15
 FLAGS_TAG = 6, 8  # type and size of an array's first element
 NUMBERS = {1, 2, 3, 4, 5, 6, 7, 9, 12, 13}
@@ -18,8 +25,9 @@ IS_COMPLEX = 0x0800
 def is_sound(content: bytes, names: Collection[str]) -> bool:
     """Whether the variables of these names have types, sizes and numbers of elements that go together.
 
-    They are arrays of numbers or text, or cell arrays of such. What is compressed has a checksum and needs no
-    such care; nor do files older or newer than level 5, the format of MATLAB's -v6 and -v7.
+    They are arrays of numbers or text, or cell arrays of such; what is compressed must be no larger than its
+    numbers are, or MOST_CELLS. Files older or newer than level 5, the format of MATLAB's -v6
+    and -v7, need no such care.
 
     References
     ----------
@@ -29,10 +37,34 @@ def is_sound(content: bytes, names: Collection[str]) -> bool:
     if len(content) < HEADER or 0 in content[:4] or content[125 if content[126:127] == b"I" else 124] != 1:
         return True
     try:
-        elements = _elements(memoryview(content)[HEADER:], order)
-        return all(_is_sound_matrix(body, order, names) for kind, body in elements if kind == MATRIX)
-    except (struct.error, ValueError, RecursionError):
+        return all(
+            _is_sound_matrix(body if kind == MATRIX else _expanded(body, order, names), order, names)
+            for kind, body in _elements(memoryview(content)[HEADER:], order)
+            if kind in (MATRIX, COMPRESSED)
+        )
+    except (struct.error, ValueError, RecursionError, zlib.error):
         return False
+
+
+def _expanded(packed: memoryview, order: str, names: Collection[str]) -> memoryview:
+    """What a compressed element holds, or nothing if it has none of ``names``; raises ValueError where it is too large.
+
+    Its checksum says nothing of a size: a thousandth of what it expands to may be all there is in the file.
+    """
+    head = memoryview(zlib.decompressobj().decompress(packed, HEAD))[8:]
+    (_, flags), (_, sizes), (_, name) = islice(_elements(head, order), 3)
+    if bytes(name).decode("latin-1") not in names:
+        return head[:0]
+    is_cell = struct.unpack_from(f"{order}I", flags)[0] & 0xFF == CELL_CLASS
+    count = math.prod(struct.unpack(f"{order}{len(sizes) // 4}i", sizes))
+    stream = zlib.decompressobj()
+    content = stream.decompress(packed, MOST_CELLS if is_cell else min(HEAD + LARGEST * max(count, 0), MOST_BYTES))
+    if not stream.eof:
+        raise ValueError
+    kind, size = struct.unpack_from(f"{order}II", content)
+    if kind != MATRIX or size > len(content) - 8:
+        raise ValueError
+    return memoryview(content)[8 : 8 + size]
 
 
 def _elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:

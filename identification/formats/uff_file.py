@@ -14,6 +14,7 @@ from identification.base.arrays import Array, Whole
 from identification.base.errors import InputError
 from identification.base.files import read_bytes
 from identification.formats.columns import INPUTS, Table, quoted
+from identification.formats.sizes import require_size
 
 FUNCTION = 58
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6  # function types
@@ -66,6 +67,7 @@ def read_uff(path: Path) -> list[Table]:
 
 def _functions(path: Path) -> list[Function]:
     """The functions of the file's data sets 58, complete."""
+    require_size(path)
     read_bytes(path)  # pyuff does not say why it cannot open a file
     number = 0
     functions: list[Function] = []

@@ -24,6 +24,7 @@ from identification.sweeps.local_models import (
 
 SHORTEST_WINDOW = COEFFICIENTS + 3  # three degrees of freedom left for the variance
 WINDOWS = 600  # aimed at; a longer record makes longer windows
+HELD = 300_000  # lines that are fitted at a time
 RELATIVE_WIDTH = 1 / 64  # of a window, at most, of its frequency where the shortest window allows it
 BELOW_NYQUIST = 0.8  # of the Nyquist frequency: the part that analysers use; beyond, a held input's alias is as large
 TRUNCATED = 2.0  # F ratio of neighbouring windows together; noise alone gives 1.0 +- 0.3
@@ -221,7 +222,7 @@ def _places(width: int) -> tuple[Real, Real]:
 
 
 def _tiles(band: Whole) -> list[Whole]:
-    """The band's lines in windows of odd width, (C, W) for each width, narrower where frequencies are low."""
+    """The band's lines in windows of odd width, (C, W), HELD lines at most; narrower where frequencies are low."""
     widest = max(SHORTEST_WINDOW, band.size // WINDOWS) // 2 * 2 + 1
     tiles, first = [], 0
     while first < band.size:
@@ -231,7 +232,8 @@ def _tiles(band: Whole) -> list[Whole]:
         count = lines // width
         spare = (lines - count * width) // 2 if last else 0
         if count:
-            tiles.append(band[first + spare : first + spare + count * width].reshape(count, width))
+            tile = band[first + spare : first + spare + count * width].reshape(count, width)
+            tiles += np.array_split(tile, 1 + tile.size // HELD)
         first = band.size if last or not count else first + count * width
     return tiles
 

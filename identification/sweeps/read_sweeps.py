@@ -24,6 +24,7 @@ FEWEST_SAMPLES = 128
 JITTER = 0.05  # largest distance of a sample from the uniform grid, in sampling intervals
 CONSTANT = 1e-9  # of a signal's size
 LARGEST = 1e50  # number in a column
+MOST_POINTS = 20_000_000  # lines or samples of a test; a fit takes some 200 bytes of memory for each
 KEPT = ".npz"
 READERS = {".csv": read_csv, ".mat": read_mat, ".uff": read_uff, ".unv": read_uff, ".58": read_uff}
 
@@ -114,6 +115,7 @@ def _from_response(table: Table, name: str) -> FrequencyResponse:
     frequency = next(iter(table.columns))
     values = table.columns[frequency]
     table.refuse_any(values <= 0, frequency, "a positive number")
+    table.refuse_any(values < 1 / LARGEST, frequency, f"{1 / LARGEST:g} or more")
     _check_order(table, frequency)
     if values.size < FEWEST_LINES:
         table.refuse(f"holds {values.size} frequencies; expected {FEWEST_LINES} or more")
@@ -163,6 +165,8 @@ def _from_record(table: Table, name: str) -> FrequencyResponse:
     if time_s.size < FEWEST_SAMPLES:
         table.refuse(f"holds {time_s.size} samples; expected {FEWEST_SAMPLES} or more")
     sampling_s = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
+    if sampling_s < 1 / LARGEST:
+        table.refuse(f"the samples lie {sampling_s:.3g} s apart; expected {1 / LARGEST:g} s or more")
     _check_uniform(table, sampling_s)
     held = "input_held" in table.columns
     driven = "input_held" if held else "input"
@@ -205,6 +209,8 @@ def _lead(record: Record) -> float:
 
 
 def _check_numbers(table: Table) -> None:
+    if table.numbers.size > MOST_POINTS:
+        table.refuse(f"holds {table.numbers.size} points; expected at most {MOST_POINTS}")
     for column, values in table.columns.items():
         table.refuse_any(~np.isfinite(values), column, "a finite number")
         table.refuse_any(np.abs(values) > LARGEST, column, f"a number up to {LARGEST:g} in size")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +16,9 @@ from identification.model.pulse_response import aliases
 
 if TYPE_CHECKING:
     from control import FrequencyResponseData
+
+
+WIDEST = 1e9  # ratio of the highest to the lowest frequency
 
 
 @dataclass(frozen=True, repr=False)
@@ -113,6 +117,16 @@ class FrequencyResponse:
         if not data.issiso():
             raise InputError(f"the data have {data.ninputs} inputs and {data.noutputs} outputs; expected one of each")
         return cls(data.omega, data.frdata[0, 0], None, data.name)
+
+
+def require_one_band(tests: Sequence[FrequencyResponse]) -> None:
+    """Refuse tests of which no plant can be computed together: raises InputError where lines lie WIDEST times apart."""
+    low, high = min(test.omega[0] for test in tests), max(test.omega[-1] for test in tests)
+    if high / WIDEST > low:
+        raise InputError(
+            f"the lines lie from {low:.6g} to {high:.6g} rad/s; expected a band whose ends are no more than {WIDEST:g} "
+            "times apart"
+        )
 
 
 def alias_free(test: FrequencyResponse, plant: PlantModel) -> FrequencyResponse:

@@ -53,7 +53,9 @@ def locked(name: str) -> dict[str, str]:
     return {block.splitlines()[0].removesuffix(" \\"): block for block in blocks}
 
 
-@pytest.mark.parametrize(("name", "least"), [("requirements.lock", 30), ("requirements-bench.lock", 5)])
+@pytest.mark.parametrize(
+    ("name", "least"), [("requirements.lock", 30), ("requirements-bench.lock", 5), ("requirements-audit.lock", 5)]
+)
 def test_lock_file_has_hashes_and_no_address(name: str, least: int) -> None:
     text = (ROOT / name).read_text(encoding="utf-8")
     assert "://" not in text
@@ -62,11 +64,12 @@ def test_lock_file_has_hashes_and_no_address(name: str, least: int) -> None:
     assert all("--hash=sha256:" in block for block in locked(name).values())
 
 
-def test_lock_files_agree_on_what_both_name() -> None:
-    main, bench = locked("requirements.lock"), locked("requirements-bench.lock")
+@pytest.mark.parametrize("name", ["requirements-bench.lock", "requirements-audit.lock"])
+def test_lock_files_agree_on_what_both_name(name: str) -> None:
+    main, added = locked("requirements.lock"), locked(name)
     names = {pin.split("==")[0] for pin in main}
-    both = {pin: block for pin, block in bench.items() if pin.split("==")[0] in names}
-    assert both
+    both = {pin: block for pin, block in added.items() if pin.split("==")[0] in names}
+    assert both or name == "requirements-audit.lock"  # which need not share any
     for pin, block in both.items():
         assert set(re.findall("sha256:[0-9a-f]+", block)) == set(re.findall("sha256:[0-9a-f]+", main.get(pin, ""))), pin
 
@@ -78,7 +81,7 @@ def test_lock_files_hold_what_the_project_asks_for() -> None:
             *project["project"]["dependencies"],
             *(one for extra in project["project"]["optional-dependencies"].values() for one in extra),
         ],
-        "requirements-bench.lock": project["dependency-groups"]["bench"],
+        **{f"requirements-{name}.lock": asked for name, asked in project["dependency-groups"].items()},
     }
     for name, requirements in wanted.items():
         pinned = {pin.split("==")[0] for pin in locked(name)}

@@ -11,6 +11,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 from threading import Thread
+from typing import Any
 
 import numpy as np
 import psutil
@@ -216,6 +217,16 @@ def run(folder: Path, output: str, *arguments: str) -> Result:
     return CliRunner().invoke(main, command)
 
 
+def in_a_process(folder: Path, output: str, *arguments: str) -> list[str]:
+    """The command that :func:`run` runs, with small chunks."""
+    code = (
+        "from experiments.campaign import checkpoint; checkpoint.CHUNK = 2; "
+        "from experiments.__main__ import main; main()"
+    )
+    command = ["campaign", str(folder / "design.json"), *ARGUMENTS, "--output", str(folder / output), *arguments]
+    return [sys.executable, "-c", code, *command]
+
+
 def wait_for_parts(folder: Path, count: int) -> None:
     deadline = time.monotonic() + 30
     while len(list(folder.glob("part-*.parquet"))) < count and time.monotonic() < deadline:
@@ -239,12 +250,7 @@ def test_the_file(folder: Path, whole: bytes, extended_design: Design) -> None:
 @pytest.mark.usefixtures("small_chunks")
 def test_a_killed_command_goes_on(folder: Path, whole: bytes) -> None:
     parts = folder / "resumed.parquet.parts"
-    code = (
-        "from experiments.campaign import checkpoint; checkpoint.CHUNK = 2; "
-        "from experiments.__main__ import main; main()"
-    )
-    command = ["campaign", str(folder / "design.json"), *ARGUMENTS, "--output", str(folder / "resumed.parquet")]
-    with subprocess.Popen([sys.executable, "-c", code, *command], cwd=ROOT) as process:
+    with subprocess.Popen(in_a_process(folder, "resumed.parquet"), cwd=ROOT) as process:
         wait_for_parts(parts, 2)
         workers = psutil.Process(process.pid).children(recursive=True)
         process.kill()
@@ -295,6 +301,41 @@ def test_a_cluster_that_loses_a_worker_writes_the_same_file(folder: Path, whole:
     assert result.exit_code == 0, result.output
     assert 3 <= lost[0] < PLANTS // 2
     assert (folder / "cluster.parquet").read_bytes() == whole
+
+
+def test_a_scheduler_that_dies_leaves_what_is_done(folder: Path) -> None:
+    """In a process of its own, with a worker that its death ends."""
+    parts, address = folder / "left.parquet.parts", folder / "scheduler.json"
+    dask = [sys.executable, "-m", "dask"]
+    at = ["--scheduler-file", str(address), "--no-dashboard"]
+    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
+    worker_options = ["--nthreads", "1", "--no-nanny", "--death-timeout", "1"]
+    with (
+        subprocess.Popen([*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", *at], **quiet) as scheduler,
+        subprocess.Popen([*dask, "worker", *worker_options, *at], **quiet | {"cwd": ROOT}) as worker,
+    ):
+
+        def lose_it() -> None:
+            wait_for_parts(parts, 2)
+            scheduler.kill()
+
+        deadline = time.monotonic() + 30
+        while not address.exists() and time.monotonic() < deadline:
+            time.sleep(0.01)
+        thread = Thread(target=lose_it)
+        thread.start()
+        given = "--scheduler", json.loads(address.read_text(encoding="utf-8"))["address"]
+        command = in_a_process(folder, "left.parquet", *given)
+        result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+        thread.join()
+        worker.kill()
+    assert result.returncode == 2
+    said, sentence = result.stderr.splitlines()
+    assert said.endswith(f"what is done is kept in {parts}")
+    assert "the cluster gave up (" in sentence
+    assert sentence.endswith("; the same command goes on from what is done")
+    left = 2 * len(list(parts.glob("part-*.parquet")))
+    assert 4 <= left < PLANTS
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,8 @@ from pyarrow import parquet
 from experiments.__main__ import main
 from experiments.campaign import distributions as module
 from experiments.campaign.distributions import campaign_tables
+from experiments.campaign.seal import SEAL, Seal
+from identification.base.errors import InputError
 
 FACTS = {"plants": "40", "seed": "7", "limit": "12.5", "horizon_s": "25"}
 NEVER = {"peak_error": np.nan, "steady_error": np.nan, "recovery_s": np.nan}
@@ -38,7 +40,12 @@ def plants(count: int = 40) -> pd.DataFrame:
 
 def written(path: Path, table: pd.DataFrame, facts: dict[str, str] | None = None, **options: int) -> Path:
     content = pyarrow.Table.from_pandas(table, preserve_index=False)
-    parquet.write_table(content.replace_schema_metadata(FACTS if facts is None else facts), path, **options)
+    content = content.replace_schema_metadata(FACTS if facts is None else facts)
+    seal = Seal(content.schema)
+    for batch in content.to_batches():
+        seal.update(batch)
+    content = content.replace_schema_metadata((content.schema.metadata or {}) | {SEAL: str(seal)})
+    parquet.write_table(content, path, **options)
     return path
 
 
@@ -199,6 +206,44 @@ def test_what_is_no_parquet_file_is_refused(campaign: Path, tmp_path: Path) -> N
     assert "cannot be read (" in refusal(half, tmp_path)
     half.write_bytes(b"plant,distance\n")
     assert "cannot be read (" in refusal(half, tmp_path)
+
+
+def test_a_damaged_file_gives_no_other_numbers(tmp_path: Path) -> None:
+    """Bytes at random places, rows and metadata among them, each changed in one bit."""
+    path = written(tmp_path / "campaign.parquet", plants())
+    whole, expected = path.read_bytes(), campaign_tables(path)
+    rng, refusals = np.random.default_rng(1), []
+    for place in rng.integers(len(whole), size=300):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << rng.integers(8)
+        path.write_bytes(damaged)
+        try:
+            found = campaign_tables(path)
+        except InputError as error:
+            refusals.append(str(error))
+            continue
+        for name, table in expected.items():
+            pd.testing.assert_frame_equal(found[name], table, check_exact=True)
+    assert len(refusals) > 150
+    assert all(sentence.startswith(f"{path}: ") and "\n" not in sentence for sentence in refusals)
+
+
+@pytest.mark.parametrize("column", ["steady_error", "plant", "covered", "anti_windup"])
+def test_a_number_that_is_changed_breaks_the_seal(column: str, tmp_path: Path) -> None:
+    table = parquet.read_table(written(tmp_path / "campaign.parquet", plants()))
+    values = table[column].to_pylist()
+    values[0], values[7] = values[7], values[0]
+    place = table.schema.names.index(column)
+    parquet.write_table(table.set_column(place, column, pyarrow.array(values)), tmp_path / "changed.parquet")
+    assert "is not as it was written" in refusal(tmp_path / "changed.parquet", tmp_path)
+
+
+@pytest.mark.parametrize("facts", [{"seed": "8"}, {SEAL: "0"}, {"design": "mine.json"}])
+def test_what_is_said_of_the_rows_is_sealed_too(facts: dict[str, str], tmp_path: Path) -> None:
+    table = parquet.read_table(written(tmp_path / "campaign.parquet", plants()))
+    said = {name.decode(): text for name, text in table.schema.metadata.items()} | facts
+    parquet.write_table(table.replace_schema_metadata(said), tmp_path / "changed.parquet")
+    assert "is not as it was written" in refusal(tmp_path / "changed.parquet", tmp_path)
 
 
 def test_the_command_writes_the_tables(campaign: Path, tmp_path: Path) -> None:

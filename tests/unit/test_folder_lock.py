@@ -108,7 +108,7 @@ def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_where_nothing_can_be_written(lock: Lock, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     for target in (tmp_path / "file" / "out", tmp_path / ("x" * 300)):
-        with pytest.raises(InputError, match=r"cannot be (made|written) \("), lock(target):
+        with pytest.raises(InputError, match=r"cannot be (made|written) \(|: no such folder"), lock(target):
             pass
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
@@ -117,3 +117,9 @@ def test_a_link_that_leads_nowhere_is_no_folder(tmp_path: Path) -> None:
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     with pytest.raises(InputError, match=r"loop: cannot be made \("), locked_folder(tmp_path / "loop"):
         pass
+
+
+def test_a_file_in_no_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="nowhere: no such folder"), locked_file(tmp_path / "nowhere" / "out.csv"):
+        pass
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,144 @@
+"""How long inputs of a size take, and how much memory: each fit in a process of its own, and a campaign's file.
+
+.venv/bin/python benchmarks/size_study.py --lines 1000000 --samples 10000000 --plants 50000
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+import zlib
+from pathlib import Path
+from struct import pack
+
+import numpy as np
+from scipy.io import savemat
+from scipy.signal import cont2discrete, lfilter
+
+ROOT = Path(__file__).resolve().parents[1]
+MEGABYTE = 1e6
+IMPORTS = "from experiments.campaign import checkpoint, distributions, run_plants; import pyarrow.parquet"
+CAMPAIGN = """
+import sys, numpy as np
+from pathlib import Path
+from design.design_file import read_design
+from experiments.campaign import run_campaign
+from experiments.runs.references import sinusoid
+folder, plants = Path(sys.argv[1]), int(sys.argv[2])
+
+def made_up(campaign, chunks):
+    random = np.random.default_rng(1)
+    for first, last in chunks:
+        count = 3 * (last - first)
+        runs = ["none", "thesis", "corrected"] * (last - first)
+        rows = {"plant": np.repeat(range(first, last), 3), "anti_windup": runs}
+        names = ["distance", "peak_error", "steady_error", "recovery_s", *(f"number_{k}" for k in range(16))]
+        rows |= dict(zip(names, random.uniform(size=(20, count)), strict=True))
+        rows |= dict.fromkeys(("linear_stable", "diverged", "covered"), [False] * count)
+        yield (first, last), rows | {"guaranteed_sector": [0.0] * count}
+
+run_campaign.run_here = made_up
+file, reference = folder / "design.json", sinusoid(amplitude=50.0, omega=1.5)
+output = folder / "campaign.parquet"
+run_campaign.run_campaign(read_design(file), file, plants, 1, reference, 12.0, 5, None, output)
+"""
+
+
+def write_lines(path: Path, count: int) -> None:
+    """A frequency response of 5 to 200 Hz with 2 % noise."""
+    random, frequency_hz = np.random.default_rng(1), np.linspace(5, 200, count)
+    s = 2j * np.pi * frequency_hz
+    response = (
+        7 / s * (1 + 0.02 * s / 174 + (s / 174) ** 2) / (1 + 0.04 * s / 282 + (s / 282) ** 2) * np.exp(-0.008 * s)
+    )
+    response *= 1 + 0.02 * (random.normal(size=count) + 1j * random.normal(size=count))
+    table = np.column_stack([frequency_hz, response.real, response.imag])
+    np.savetxt(path, table, fmt="%.12g", delimiter=",", header="frequency_hz,real,imag", comments="")
+
+
+def write_samples(path: Path, count: int) -> None:
+    """A record of the same plant, its input held."""
+    time_s = np.arange(count) * 2e-4
+    share = np.clip(time_s / (0.9 * time_s[-1]), 0, 1)
+    u = np.sin(2 * np.pi * 0.9 * time_s[-1] * (5 * share + 195 / 2 * share**2)) * (share < 1)
+    denominator = np.polymul([1, 0], [1 / 282**2, 0.04 / 282, 1])
+    b, a, _ = cont2discrete((7 * np.array([1 / 174**2, 0.02 / 174, 1]), denominator), 2e-4, "zoh")
+    y = np.concatenate([np.zeros(40), lfilter(b.ravel(), a, u)[:-40]])
+    y += 1e-3 * np.random.default_rng(1).normal(size=count)
+    savemat(path, {"time_s": time_s[:, None], "input_held": u[:, None], "output": y[:, None]})
+
+
+def write_pairs(path: Path, count: int) -> None:
+    """Lines of which each stands twice, 1e-9 Hz apart."""
+    once = np.linspace(5, 200, count // 2)
+    s = 2j * np.pi * np.sort(np.concatenate([once, once + 1e-9]))
+    table = np.column_stack([s.imag, (7 / s).real, (7 / s).imag])
+    np.savetxt(path, table, fmt="%.17g", delimiter=",", header="omega,real,imag", comments="")
+
+
+def write_bomb(path: Path, zeros: int) -> None:
+    """A MAT file whose frequency_hz is that many zeros, compressed."""
+    head = pack("<IIII", 6, 8, 6, 0) + pack("<IIii", 5, 8, zeros, 1) + pack("<II", 1, 12) + b"frequency_hz" + bytes(4)
+    stream = zlib.compressobj(9)
+    content = stream.compress(pack("<II", 14, len(head) + 8 + 8 * zeros) + head + pack("<II", 9, 8 * zeros))
+    for first in range(0, zeros, 2**20):
+        content += stream.compress(bytes(8 * min(2**20, zeros - first)))
+    content += stream.flush()
+    header = b"MATLAB 5.0 MAT-file".ljust(124) + pack("<H", 0x100) + b"IM"
+    path.write_bytes(header + pack("<II", 15, len(content)) + content)
+
+
+def measured(command: list[str]) -> tuple[float, float, int]:
+    """Seconds, peak memory in MB and exit status of a command."""
+    script = (
+        "import resource, subprocess, sys; code = subprocess.call(sys.argv[1:], stdout=subprocess.DEVNULL); "
+        "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, code)"
+    )
+    start = time.perf_counter()
+    run = subprocess.run([sys.executable, "-c", script, *command], cwd=ROOT, capture_output=True, text=True, check=True)
+    peak, code = map(int, run.stdout.split())
+    return time.perf_counter() - start, peak * 1024 / MEGABYTE, code
+
+
+def main() -> None:
+    """Print a line for each input; exit with 1 where one took more than it may."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--lines", type=int, default=100_000, help="of a frequency response")
+    parser.add_argument("--samples", type=int, default=1_000_000, help="of a record")
+    parser.add_argument("--plants", type=int, default=5_000, help="of a campaign, whose runs cost nothing")
+    parser.add_argument("--zeros", type=int, default=200_000_000, help="that a MAT file of a thousandth expands to")
+    sizes = parser.parse_args()
+    python, failed = sys.executable, False
+    print(f"{'input':32s}{'size':>12s}{'status':>8s}{'time s':>9s}{'at most':>9s}{'peak MB':>9s}{'at most':>9s}")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        bare = measured([python, "-c", IMPORTS])[1]
+        inputs = (
+            ("frequency response, lines", "lines.csv", write_lines, sizes.lines, 0, 60.0, 1000.0),
+            ("lines read twice", "pairs.csv", write_pairs, 1000, 0, 30.0, 500.0),
+            ("record, samples", "record.mat", write_samples, sizes.samples, 0, 120.0, 300 + 250e-6 * sizes.samples),
+            ("compressed zeros, refused", "zeros.mat", write_bomb, sizes.zeros, 2, 10.0, 600.0),
+        )
+        for label, file, write, size, status, longest, most in inputs:
+            write(folder / file, size)
+            fit = [python, "-m", "identification", "fit", str(folder / file), "--output", str(folder / "model.json")]
+            failed |= not _said(label, size, measured(fit), status, longest, most)
+            (folder / file).unlink()
+        options = ["--reference-omega", "1.5", "--a", "4", "--e", "2", "--f", "1"]
+        measured([python, "-m", "design", "extended", "implied", *options, "--output", str(folder / "design.json")])
+        run = measured([python, "-c", CAMPAIGN, name, str(sizes.plants)])
+        failed |= not _said("campaign, plants (runs made up)", sizes.plants, run, 0, 600.0, bare + 300.0)
+    sys.exit(int(failed))
+
+
+def _said(label: str, size: int, found: tuple[float, float, int], status: int, longest: float, most: float) -> bool:
+    seconds, peak, code = found
+    print(f"{label:32s}{size:12d}{code:8d}{seconds:9.1f}{longest:9.0f}{peak:9.0f}{most:9.0f}", flush=True)
+    return code == status and seconds <= longest and peak <= most
+
+
+if __name__ == "__main__":
+    main()
