@@ -171,6 +171,8 @@ def campaigns(rng: random.Random, cheap: bool) -> Case:
         column = rng.randrange(table.shape[1])
         value = rng.choice((None, -1, 0, 1, 10**12, 0.5, 1e300, -0.0, np.nan, np.inf, True, "none", "\x1b", b"\xff"))
         rows = [rng.randrange(len(table))] if rng.random() < 0.7 else list(range(len(table)))
+        if table.columns[column] == "guaranteed_sector" and value == np.inf:
+            value = 1.0  # every sector may be guaranteed
         table.iloc[rows, column] = value
         if rng.random() < 0.2:
             table = table.drop(columns=table.columns[column])

@@ -185,7 +185,7 @@ def _require_whole(path: Path, unlimited: bool) -> None:
         raise Fault(f"left {path.name}")
     if not content:
         raise Fault(f"wrote an empty {path.suffix}")
-    if path.suffix == ".json":
+    if path.suffix == ".json" and content.startswith(b"{"):
         json.loads(content, parse_constant=_refuse, parse_float=_finite)
     elif path.suffix == ".svg":
         ElementTree.fromstring(content)
