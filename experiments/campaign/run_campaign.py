@@ -34,6 +34,7 @@ def run_campaign(
     periods: int,
     scheduler: str | None,
     output: Path,
+    anew: bool,
 ) -> None:
     """Run a campaign, keep it, and say what came out.
 
@@ -47,8 +48,8 @@ def run_campaign(
         Of every run, see :class:`experiments.campaign.run_plants.Campaign`.
     scheduler
         Address of a Dask cluster's; None runs the campaign here.
-    output
-        The parquet file.
+    output, anew
+        The parquet file, and whether the parts of another campaign beside it are removed.
 
     Raises
     ------
@@ -62,7 +63,7 @@ def run_campaign(
     digest = hashlib.sha256(read_bytes(design)).hexdigest()
     campaign = Campaign(content, digest, seed, reference, limit, periods, code_sha256())
     with locked_file(output):
-        _complete(CampaignFile(output, campaign, plants, design), campaign, plants, scheduler)
+        _complete(CampaignFile(output, campaign, plants, design, anew), campaign, plants, scheduler)
     summary = campaign_tables(output)["campaign_summary"]
     click.echo(_promised(summary))
     click.echo(f"{plants} plants within W_a -> {output}; limits +-{limit:.6g}, {campaign.horizon_s:.6g} s each")
