@@ -17,7 +17,7 @@ from antiwindup.output_folder import OutputFolder
 from antiwindup.steps import Step
 from antiwindup.worker import start
 from identification.base.errors import InputError
-from identification.base.files import partial_file, read_text, write_whole
+from identification.base.files import partial_file, write_whole
 from identification.base.folder_lock import locked_folder
 from identification.base.manifest import read_manifest
 
@@ -56,7 +56,8 @@ class Build:
         The steps that are run, with those that they need. Of the others, what hangs on files that were made anew is
         removed.
     goes_on
-        Whether a step that refuses stops only those that need its outputs. The first step stops everything.
+        Whether a step that refuses stops only those that need its outputs. The first step stops everything. What was
+        refused is asked again in every build.
     jobs
         How many run at once.
     force
@@ -91,17 +92,19 @@ class Build:
             places = [path for step in self.steps for path in (*step.outputs, step.refusal)]
             if not self.force:
                 self._folder.require_free(places)
-            self._folder.remove(set(self._folder.written) - {self._folder.name(path) for path in places})
+            self._folder.remove({self.path / name for name in self._folder.written} - {*places})
             steps = self._before(self.wanted)
             try:
                 for ended, _ in enumerate(self._ended(steps)):
                     tell(ended + 1, [running.step.name for running in self._running.values()])
+                others = [step for step in self._after(self._made) if step not in steps]
+                self._remove([step for step in others if not self._folder.holds(self._source(step), step.outputs)])
             finally:
                 for running in self._running.values():
                     running.process.terminate()
                     running.process.join()
                     running.closing.close()
-            self._remove([step for step in self._after(self._made) if step not in steps])
+                self._folder.save()
 
     def _ended(self, steps: Sequence[Step]) -> Iterator[Step]:
         """The steps as they end."""
@@ -133,12 +136,7 @@ class Build:
         if any(folder.content(path) is None for path in step.needs):
             self._remove([step])
             return True
-        read = {str(path): folder.content(path) for path in (*step.needs, *step.uses)}
-        source = sha256(json.dumps([step.command, code_of(step.command), read]).encode()).hexdigest()
-        if folder.holds(source, step.outputs):
-            return True
-        if folder.holds(source, [step.refusal]):
-            self.refused[step.name] = read_text(step.refusal).strip()
+        if folder.holds(source := self._source(step), step.outputs):
             return True
         self._made.append(step)
         folder.begin(source, step.outputs)
@@ -156,7 +154,7 @@ class Build:
         ended.closing.close()
         if ended.process.exitcode == 0 and all(folder.content(path) for path in step.outputs):
             folder.end(step.outputs)
-            folder.remove([folder.name(step.refusal)])
+            folder.remove([step.refusal])
             self.printed[step.name] = said
             return step
         before, refused, sentence = said.strip().rpartition(REFUSED)
@@ -173,9 +171,13 @@ class Build:
         folder.end([step.refusal])
         return step
 
+    def _source(self, step: Step) -> str:
+        """The hash of all that decides on what a step writes."""
+        read = {str(path): self._folder.content(path) for path in (*step.needs, *step.uses)}
+        return sha256(json.dumps([step.command, code_of(step.command), read]).encode()).hexdigest()
+
     def _remove(self, steps: Sequence[Step]) -> None:
-        names = [self._folder.name(path) for step in steps for path in (*step.outputs, step.refusal)]
-        self._folder.remove(names)
+        self._folder.remove(path for step in steps for path in (*step.outputs, step.refusal))
 
     def _before(self, wanted: Sequence[Step]) -> list[Step]:
         """The steps that are wanted and those that they need, in their order."""

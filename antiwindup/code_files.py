@@ -29,7 +29,7 @@ def code_of(command: Sequence[str]) -> str:
     command
         The room and the words after it, such as ``("experiments", "thesis", "pid", ...)``.
     """
-    return _hash_of(frozenset(files_of_command(command)))
+    return hash_of(frozenset(files_of_command(command)))
 
 
 def files_of_command(command: Sequence[str]) -> list[str]:
@@ -106,6 +106,13 @@ def read(file: str) -> tuple[frozenset[str], dict[str, frozenset[str]]]:
     return frozenset(module), commands
 
 
+@cache
+def hash_of(files: frozenset[str]) -> str:
+    """The hash of the contents of files of the project and of the versions of the packages it runs with."""
+    digests = [f"{file} {sha256((ROOT / file).read_bytes()).hexdigest()}" for file in sorted(files)]
+    return sha256("\n".join([*digests, *_packages()]).encode()).hexdigest()
+
+
 def closure(files: Iterable[str]) -> list[str]:
     """Files with all that they need."""
     met, left = set[str](), list(files)
@@ -123,12 +130,6 @@ def _tables(figure: Path) -> tuple[str, ...]:
         if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "TABLES" and node.value:
             return tuple(ast.literal_eval(node.value))
     raise TypeError(f"{figure}: no TABLES; expected the names of the tables that it draws")
-
-
-@cache
-def _hash_of(files: frozenset[str]) -> str:
-    digests = [f"{file} {sha256((ROOT / file).read_bytes()).hexdigest()}" for file in sorted(files)]
-    return sha256("\n".join([*digests, *_packages()]).encode()).hexdigest()
 
 
 @cache

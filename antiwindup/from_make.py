@@ -1,4 +1,4 @@
-"""What make hands to a build: the values of its variables, by the environment, so that neither make nor a shell reads them.
+"""What make hands to a build: values of its variables, by the environment, which neither make nor a shell has read.
 
 ``python -m antiwindup.from_make refit`` is ``antiwindup refit`` with ANTIWINDUP_SWEEPS, ANTIWINDUP_OUTPUT and so on.
 """

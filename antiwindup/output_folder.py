@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from identification.base.errors import InputError
+from identification.base.files import require_replaceable
 from identification.base.manifest import Written, content_of, write_manifest
 
 
@@ -40,7 +41,7 @@ class OutputFolder:
         return self.contents[path]
 
     def require_free(self, paths: Sequence[Path]) -> None:
-        """Refuse, with an InputError, places of outputs that hold what the project did not write."""
+        """Refuse, with an InputError, places of outputs that hold what the project did not write or may not replace."""
         for path in paths:
             written = self.written.get(self.name(path))
             if written is None and os.path.lexists(path):
@@ -53,6 +54,7 @@ class OutputFolder:
                 and self.content(path) not in (None, written.content)
             ):
                 raise InputError(f"{path}: was changed since it was written; expected another folder, or --force")
+            require_replaceable(path)
 
     def holds(self, source: str, paths: Iterable[Path]) -> bool:
         """Whether files stand there as they were written, from this source."""
@@ -60,27 +62,27 @@ class OutputFolder:
         return all(content is not None and written == Written(source, content) for written, content in found)
 
     def begin(self, source: str, paths: Iterable[Path]) -> None:
-        """Note that files are about to be written: what stands in their places is the project's, whole or not."""
+        """Note, on the disk too, that files are about to be written: whatever stands there then is the project's."""
         for path in paths:
             path.parent.mkdir(exist_ok=True)
             self.written[self.name(path)] = Written(source, None)
             self.contents.pop(path, None)
-        write_manifest(self.path, self.written)
+        self.save()
 
     def end(self, paths: Iterable[Path]) -> None:
         """Note what the files that were begun hold."""
         for path in paths:
             name = self.name(path)
             self.written[name] = Written(self.written[name].source, self.content(path))
-        write_manifest(self.path, self.written)
 
-    def remove(self, names: Iterable[str]) -> None:
+    def remove(self, paths: Iterable[Path]) -> None:
         """Remove those files that the project wrote and nobody changed; what was changed is the user's from now on."""
-        found = [name for name in names if name in self.written]
-        for name in found:
-            path, written = self.path / name, self.written.pop(name)
-            if written.content is None or written.content == content_of(path):
+        for path in paths:
+            written = self.written.pop(self.name(path), None)
+            if written and (written.content is None or written.content == content_of(path)):
                 path.unlink(missing_ok=True)
             self.contents.pop(path, None)
-        if found:
-            write_manifest(self.path, self.written)
+
+    def save(self) -> None:
+        """Write the manifest."""
+        write_manifest(self.path, self.written)

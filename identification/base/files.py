@@ -135,7 +135,7 @@ def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterab
         for target, goal in goals.items():
             if str(goal) in read:
                 raise InputError(f"{target}: is an input too; expected another file to write")
-            _require_replaceable(target, goal)
+            require_replaceable(target)
         for folder in {goal.parent for goal in goals.values()}:
             _remove_abandoned(folder)
         with ExitStack() as stack:
@@ -152,15 +152,23 @@ def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterab
         raise InputError(f"{target}: cannot be written ({error.strerror or error})") from None
 
 
-def _require_replaceable(path: Path, goal: Path) -> None:
-    """Refuse a target that is there and is no regular file or is write-protected; raises OSError as ``stat`` does."""
+def require_replaceable(path: Path) -> None:
+    """Let pass a file that is not there or may be written over.
+
+    Raises
+    ------
+    InputError
+        The path leads to something else than a file, to a write-protected one, or nowhere.
+    """
     try:
-        mode = goal.stat().st_mode
+        mode = path.stat().st_mode
     except FileNotFoundError:
         return
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror})") from None
     if not S_ISREG(mode):
         raise InputError(f"{path}: cannot be written; expected a file, found something else")
-    if not _protected_too.get() and not (mode & 0o222 and os.access(goal, os.W_OK)):
+    if not _protected_too.get() and not (mode & 0o222 and os.access(path, os.W_OK)):
         raise InputError(f"{path}: is write-protected; expected a file that may be replaced, or --force")
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
@@ -55,7 +55,7 @@ def write_manifest(folder: Path, files: Mapping[str, Written]) -> None:
     path = folder / NAME
     if not files:
         return path.unlink(missing_ok=True)
-    content = {"schema": SCHEMA, "files": {name: asdict(files[name]) for name in sorted(files)}}
+    content = {"schema": SCHEMA, "files": {name: vars(files[name]) for name in sorted(files)}}
     return write_whole(
         {path: lambda partial: partial.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")}
     )
@@ -69,23 +69,23 @@ def content_of(path: Path) -> str | None:
         return None
 
 
-def require_as_written(folder: Path, files: Mapping[str, Written], path: Path, content: str) -> None:
-    """Refuse a file that was changed since the project wrote it.
+def require_as_written(folder: Path, paths: Iterable[Path]) -> None:
+    """Refuse files that were changed since the project wrote them.
 
     Parameters
     ----------
-    folder, files
-        A folder and what its manifest lists.
-    path
-        Any file; one outside the folder or not listed may hold anything.
-    content
-        The SHA-256 of what was read of it.
+    folder
+        A folder, which need not have a manifest.
+    paths
+        Any files; those that are not there, are outside the folder or not in its manifest may hold anything.
 
     Raises
     ------
     InputError
-        The manifest has another hash.
+        A file has another content than the manifest lists.
     """
-    written = files.get(path.relative_to(folder).as_posix()) if path.is_relative_to(folder) else None
-    if written is not None and written.content != content:
-        raise InputError(f"{path}: was changed since it was written; expected the content that {folder / NAME} lists")
+    written = read_manifest(folder)
+    for path in paths:
+        listed = written.get(path.relative_to(folder).as_posix()) if path.is_relative_to(folder) else None
+        if listed is not None and content_of(path) not in (None, listed.content):
+            raise InputError(f"{path}: was changed since it was written; expected what {folder / NAME} lists")

@@ -18,6 +18,7 @@ from report_build import BREAKING_OUT, FIGURES, REFUSAL, ROOT, SWEEPS, Page, mak
 
 from data.thesis import model_named
 from design.design_file import read_design
+from identification.base.manifest import Written, content_of, write_manifest
 from paper_figures.thesis.figure_registry import figure_module, figure_names
 from paper_figures.thesis.report.content import Content, figure_label, first_sentence, report_content
 from paper_figures.thesis.report.html import file_size, report_html
@@ -262,6 +263,15 @@ def removing(name: str) -> Callable[[Path], None]:
     return lambda build: (build / name).unlink()
 
 
+def changed(name: str) -> Callable[[Path], None]:
+    def change(build: Path) -> None:
+        path = build / name
+        write_manifest(build, {name: Written("", content_of(path))})
+        path.write_bytes(path.read_bytes() + b"\n")
+
+    return change
+
+
 @pytest.mark.parametrize(
     ("spoil", "parts"),
     [
@@ -288,6 +298,10 @@ def removing(name: str) -> Callable[[Path], None]:
         (linked_to_the_ledger, ["index.html: is an input too"]),
         (removing("design_delay_free.refused.txt"), ["design_delay_free.json: no such file"]),
         (lambda build: (build / "report").write_text(""), ["report: cannot be made"]),
+        (changed("design_extended.json"), ["design_extended.json: was changed since it was written", "manifest.json"]),
+        (changed("results/f_gamma.csv"), ["f_gamma.csv: was changed since it was written"]),
+        (changed("figures/fig_2_01.svg"), ["fig_2_01.svg: was changed since it was written"]),
+        (changed("claims.csv"), ["claims.csv: was changed since it was written"]),
     ],
 )
 def test_what_is_missing_is_refused_and_nothing_written(

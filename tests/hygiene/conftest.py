@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-ROOMS = ("identification", "design", "experiments", "paper_figures")
+ROOMS = ("antiwindup", "identification", "design", "experiments", "paper_figures")
 
 
 @pytest.fixture
@@ -17,6 +17,6 @@ def tree(tmp_path: Path) -> Path:
     copy = tmp_path / "tree"
     for folder in (*ROOMS, "data/thesis", "tests/hygiene"):
         shutil.copytree(ROOT / folder, copy / folder, ignore=shutil.ignore_patterns("__pycache__"))
-    for file in ("pyproject.toml", "setup.py", "antiwindup.py", "README.md", "LICENSE"):
+    for file in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
         shutil.copy(ROOT / file, copy / file)
     return copy

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-ROOMS = ("identification", "design", "experiments", "paper_figures", "data/thesis")
-MODULES = [ROOT / "antiwindup.py", *sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))]
+ROOMS = ("antiwindup", "identification", "design", "experiments", "paper_figures", "data/thesis")
+MODULES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
 
 
 def name_of(path: Path) -> str:

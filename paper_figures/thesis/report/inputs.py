@@ -16,6 +16,7 @@ from design.asked_model import asked_model
 from design.design_file import Design
 from identification.base.errors import InputError
 from identification.base.files import read_bytes
+from identification.base.manifest import require_as_written
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
 from identification.sweeps.read_sweeps import KEPT, input_files, read_sweeps
@@ -109,7 +110,8 @@ def read_inputs(
     Raises
     ------
     InputError
-        A file is missing that no refusal accounts for, is not what it should be, or is of another model.
+        A file is missing that no refusal accounts for, is not what it should be, is of another model, or was changed
+        since the manifest of ``build`` was written.
     """
     hashes: list[tuple[str, str]] = []
     files: list[Path] = []
@@ -153,6 +155,8 @@ def read_inputs(
             raise InputError(f"{paths[table]}: no rows below the names of the columns")
     texts["claims"] = read(build / "claims.csv", "claims.csv")
     ledger = _ledger(texts["claims"], build / "claims.csv")
+    files += [build / "figures" / f"{name}.{kind}" for name in figures for kind in ("svg", "txt")]
+    require_as_written(build, files)
     return Inputs(
         model if model in ("table", "implied") else Path(model).name,
         identified,
@@ -164,7 +168,7 @@ def read_inputs(
         held,
         texts,
         tuple(hashes),
-        (*files, *(build / "figures" / f"{name}.{kind}" for name in figures for kind in ("svg", "txt"))),
+        tuple(files),
     )
 
 

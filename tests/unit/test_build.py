@@ -1,0 +1,284 @@
+"""A build with stand-ins for the commands: what is run, what a refusal stops, and what is left alone."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+import antiwindup.build
+from antiwindup.build import Build, Crash
+from antiwindup.steps import Asked, Step, refit_steps, report_steps, thesis_steps
+from identification.base.errors import InputError
+from identification.base.folder_lock import locked_folder
+
+EXTENDED = {
+    *("design_extended.json", "design_robust.json", "results/interpolation_map.csv"),
+    *("results/campaign.parquet", "results/campaign_distance.csv"),
+    *(
+        f"results/{name}{part}.csv"
+        for name in ("extended", "f_gamma", "trade_off", "interpolation", "robustness", "limits_extended", "sampled")
+        for part in ("", "_summary")
+    ),
+    *("results/campaign.csv", "results/campaign_summary.csv"),
+    *(
+        f"figures/fig_{n}.{kind}"
+        for n in ("2_10", "2_11", "4_01", "4_02", "4_03", "4_04", "a_01", "a_02", "a_03", "a_04", "a_05", "a_06")
+        for kind in ("pdf", "svg", "png", "txt")
+    ),
+}
+"""What a refit makes with the extended design or with what was made with it."""
+
+Refit = Callable[..., Build]
+
+
+class StandIn:
+    """An ended process: it wrote its own name and what it read, as the command would; or refused, or crashed."""
+
+    def __init__(self, step: Step, log: Path, behaves: str) -> None:
+        self.sentinel, writing = os.pipe()
+        os.close(writing)
+        self.exitcode = {"crashes": 1, "refuses": 2}.get(behaves, 0)
+        texts = {"crashes": "Traceback of it", "refuses": f"Error: {step.name} will not\n"}
+        log.write_text(texts.get(behaves, f"{step.name} done\n"), encoding="utf-8")
+        read = "".join(path.read_text(encoding="utf-8") for path in (*step.needs, *step.uses) if path.is_file())
+        for path in step.outputs if not behaves else ():
+            path.write_text(f"{step.name} {sha256(read.encode()).hexdigest()}\n", encoding="utf-8")
+
+    def terminate(self) -> None:
+        pass
+
+    def join(self) -> None:
+        os.close(self.sentinel)
+
+
+@pytest.fixture
+def behaviour(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    """Name of a step -> how it ends, if not well."""
+    return {}
+
+
+@pytest.fixture
+def code(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    """First words of a command -> its code, if it is another than at first."""
+    return {}
+
+
+@pytest.fixture
+def refit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, behaviour: dict[str, str], code: dict[str, str]
+) -> Iterator[Refit]:
+    """Build ``tmp_path / "mine"`` from the sweep a.csv, or from others."""
+    steps: list[Step] = []
+
+    def start(command: Sequence[str], log: Path, force: bool) -> StandIn:
+        (step,) = [step for step in steps if step.command == command]
+        return StandIn(step, log, behaviour.get(step.name, ""))
+
+    monkeypatch.setattr(antiwindup.build, "start", start)
+    monkeypatch.setattr(
+        antiwindup.build, "code_of", lambda command: "".join(code[word] for word in command if word in code)
+    )
+    (tmp_path / "a.csv").write_text("a", encoding="utf-8")
+
+    def run(goal: str = "refit", force: bool = False, only: Sequence[str] = (), **changes: object) -> Build:
+        asked = Asked(tmp_path / "mine", None, (), (tmp_path / "a.csv",))
+        asked = replace(asked, **changes)  # type: ignore[arg-type]
+        first = refit_steps(asked) if goal == "refit" else thesis_steps(asked)
+        steps[:] = [*first, *report_steps(asked, first)]
+        wanted = [step for step in steps if step.name in only] or (steps if goal == "report" else first)
+        build = Build(asked.folder, steps, wanted, goes_on=goal == "refit", jobs=4, force=force)
+        told: list[int] = []
+        build.run(lambda ended, running: told.append(ended))
+        assert told == list(range(1, len(told) + 1))
+        return build
+
+    return run
+
+
+def built(tmp_path: Path) -> dict[str, str]:
+    """Every file below mine with its text, but for the manifest."""
+    mine = tmp_path / "mine"
+    files = {path.relative_to(mine).as_posix(): path for path in mine.rglob("*") if path.is_file()}
+    return {name: path.read_text(encoding="utf-8") for name, path in files.items() if name != "manifest.json"}
+
+
+def test_all_is_made_and_then_nothing_is_left_to_do(refit: Refit, tmp_path: Path) -> None:
+    first = refit()
+    names = set(built(tmp_path))
+    assert {"model.json", "design_delay_free.json", "design_extended.json", "summary.pdf", "summary.txt"} <= names
+    assert {f"figures/fig_{n}.pdf" for n in ("2_09", "2_10", "2_14", "4_01", "4_04")} <= names
+    assert not {"figures/fig_2_01.pdf", "figures/fig_2_02.pdf", "results/pid.csv", "report/index.html"} & names
+    assert not any("refused" in name or "partial" in name or "lock" in name for name in names)
+    assert first.printed["fit"] == "fit done\n"
+    assert refit().printed == {}
+    assert set(refit(fit=("--modes", "1")).printed) == {"fit"}  # the stand-in gives the same model
+    (tmp_path / "a.csv").write_text("b", encoding="utf-8")
+    assert set(refit(fit=("--modes", "1")).printed) == set(first.printed)
+
+
+def test_what_is_run_is_what_changed_and_what_hangs_on_it(refit: Refit, code: dict[str, str], tmp_path: Path) -> None:
+    everything = refit("report")
+    assert {"claims", "report", "pid", "conditions", "fig_2_01"} <= set(everything.printed)
+    code["fig_4_01"] = "another"
+    assert set(refit("figures").printed) == {"fig_4_01"}  # which gives the same bytes, so that the report is kept
+    assert "report/index.html" in built(tmp_path)
+    assert set(refit("figures", only=["fig_4_01"], limit=5.0).printed) == {"extended"}
+    assert {"delay_free", "sampled", "campaign"} <= set(refit("figures", limit=5.0).printed)
+
+
+def test_a_stale_report_does_not_stay_beside_another_fit(refit: Refit, tmp_path: Path) -> None:
+    refit("report")
+    (tmp_path / "a.csv").write_text("b", encoding="utf-8")
+    refit("figures")
+    assert "report/index.html" not in built(tmp_path)
+    assert "claims.csv" in built(tmp_path)
+
+
+def test_another_kind_of_build_takes_away_what_is_not_of_it(refit: Refit, tmp_path: Path) -> None:
+    refit("figures")
+    refit("refit")
+    assert not {"results/pid.csv", "figures/fig_2_01.pdf"} & set(built(tmp_path))
+
+
+def test_a_refused_design_takes_only_what_hangs_on_it(refit: Refit, behaviour: dict[str, str], tmp_path: Path) -> None:
+    refit()
+    everything = built(tmp_path)
+    behaviour["design extended"] = behaviour["design robust"] = "refuses"
+    (tmp_path / "a.csv").write_text("b", encoding="utf-8")
+    refused = refit().refused
+    assert refused == {name: f"{name} will not" for name in ("design extended", "design robust")}
+    now = built(tmp_path)
+    assert set(everything) - set(now) == EXTENDED
+    assert now["design_extended.refused.txt"] == "design extended will not\n"
+    again = refit()
+    assert (again.refused, again.printed) == (refused, {})
+    behaviour.clear()
+    (tmp_path / "a.csv").write_text("a", encoding="utf-8")
+    refit()
+    assert built(tmp_path) == everything
+
+
+def test_a_refused_experiment_leaves_its_design(refit: Refit, behaviour: dict[str, str], tmp_path: Path) -> None:
+    behaviour["f_gamma"] = behaviour["campaign"] = "refuses"
+    refit()
+    names = set(built(tmp_path))
+    assert {"design_extended.json", "results/f_gamma.refused.txt", "figures/fig_4_01.pdf", "summary.pdf"} <= names
+    assert {"results/campaign.refused.txt", "figures/fig_a_05.pdf"} <= names
+    assert not names & {"figures/fig_2_10.pdf", "figures/fig_2_11.pdf", "figures/fig_a_06.pdf", "results/campaign.csv"}
+    behaviour["design extended"] = "refuses"
+    (tmp_path / "a.csv").write_text("b", encoding="utf-8")
+    refit()
+    assert "results/f_gamma.refused.txt" not in built(tmp_path)
+
+
+def test_a_crash_is_no_refusal(refit: Refit, behaviour: dict[str, str], tmp_path: Path) -> None:
+    behaviour["design delay_free"] = "crashes"
+    with pytest.raises(Crash, match="Traceback of it"):
+        refit()
+    assert "summary.pdf" not in built(tmp_path)
+    behaviour.clear()
+    refit()
+    assert "summary.pdf" in built(tmp_path)
+
+
+def test_a_refused_fit_stops_everything_and_nothing_old_stays(
+    refit: Refit, behaviour: dict[str, str], tmp_path: Path
+) -> None:
+    refit("report")
+    behaviour["fit"] = "refuses"
+    with pytest.raises(InputError, match=r"^fit will not$"):
+        refit("refit", fit=("--modes", "1"))
+    assert set(built(tmp_path)) == {"claims.csv"}
+    (tmp_path / "mine" / "claims.csv").unlink()
+    with pytest.raises(InputError, match=r"^fit will not$"):
+        refit("refit", fit=("--modes", "1"))
+    assert set(built(tmp_path)) == set()
+
+
+def test_figures_fail_when_a_design_refuses(refit: Refit, behaviour: dict[str, str], tmp_path: Path) -> None:
+    behaviour["design extended"] = "refuses"
+    with pytest.raises(InputError, match="design extended will not"):
+        refit("figures")
+    assert not any("refused" in name for name in built(tmp_path))
+
+
+@pytest.mark.parametrize("goal", ["refit", "report"])
+def test_nothing_of_the_users_is_replaced_or_removed(
+    refit: Refit, behaviour: dict[str, str], tmp_path: Path, goal: str
+) -> None:
+    mine = tmp_path / "mine"
+    own = [
+        "design_notes.md",
+        "design_drawings/part.step",
+        "results/extended_run.csv",
+        "figures/fig_2_01.bak",
+        "report/x",
+    ]
+    for name in (*own, ".partial-notes.txt"):
+        (mine / name).parent.mkdir(parents=True, exist_ok=True)
+        (mine / name).write_text("mine", encoding="utf-8")
+    refit(goal)
+    behaviour["fit"] = "refuses"
+    (tmp_path / "a.csv").write_text("b", encoding="utf-8")
+    with pytest.raises(InputError):
+        refit(goal)
+    assert set(built(tmp_path)) - {"claims.csv", "results/pid.csv"} >= {*own, ".partial-notes.txt"}
+    assert all((mine / name).read_text(encoding="utf-8") == "mine" for name in own)
+
+
+@pytest.mark.parametrize("name", ["model.json", "results/extended.csv", "figures/fig_4_01.svg", "f_gamma.refused.txt"])
+def test_a_place_that_is_taken_is_refused_before_anything_is_done(refit: Refit, tmp_path: Path, name: str) -> None:
+    place = tmp_path / "mine" / ("results/" + name if "refused" in name else name)
+    place.parent.mkdir(parents=True)
+    place.write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match=r"is there already.*--force"):
+        refit()
+    assert len(built(tmp_path)) == 1
+    assert place.read_text(encoding="utf-8") == "mine"
+    refit(force=True)
+    assert "summary.pdf" in built(tmp_path)
+
+
+def test_a_file_that_was_changed_is_refused_and_outlives_every_build(
+    refit: Refit, behaviour: dict[str, str], tmp_path: Path
+) -> None:
+    refit()
+    table = tmp_path / "mine" / "results" / "extended.csv"
+    table.write_text("corrected by hand", encoding="utf-8")
+    with pytest.raises(InputError, match=r"extended\.csv: was changed since it was written"):
+        refit()
+    asked = Asked(tmp_path / "mine", None, (), (tmp_path / "a.csv",))
+    (tmp_path / "mine" / "figures" / "fig_4_01.pdf").write_text("also", encoding="utf-8")
+    fit = refit_steps(asked)[:1]
+    Build(asked.folder, fit, fit, goes_on=True, jobs=1).run(lambda *_: None)  # a build without tables
+    assert table.read_text(encoding="utf-8") == "corrected by hand"
+    assert "figures/fig_4_01.pdf" in built(tmp_path)
+    assert "results/extended_summary.csv" not in built(tmp_path)
+
+
+def test_a_write_protected_output_is_refused_before_anything_is_done(refit: Refit, tmp_path: Path) -> None:
+    refit()
+    (tmp_path / "mine" / "summary.txt").chmod(0o444)
+    (tmp_path / "a.csv").write_text("b", encoding="utf-8")
+    before = built(tmp_path)
+    with pytest.raises(InputError, match=r"summary\.txt: is write-protected"):
+        refit()
+    assert built(tmp_path) == before
+
+
+def test_two_builds_of_one_folder(refit: Refit, tmp_path: Path) -> None:
+    with locked_folder(tmp_path / "mine"), pytest.raises(InputError, match=r"process \d+ on"):
+        refit()
+    refit()
+
+
+def test_a_refused_build_leaves_no_folder(refit: Refit, behaviour: dict[str, str], tmp_path: Path) -> None:
+    behaviour["fit"] = "refuses"
+    with pytest.raises(InputError):
+        refit()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv"]
