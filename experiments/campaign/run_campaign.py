@@ -17,6 +17,7 @@ from experiments.campaign.run_plants import Campaign, code_sha256
 from experiments.campaign.workers import run_here, run_on_cluster
 from experiments.runs.guarantee import sector_text
 from experiments.runs.references import Reference
+from identification.base import process
 from identification.base.errors import InputError
 from identification.base.files import read_bytes
 
@@ -71,14 +72,14 @@ def run_campaign(
             with tqdm(total=plants, initial=plants - left, desc="campaign", unit=" plants", disable=None) as bar:
                 for chunk, columns in done:
                     file.keep(chunk, columns)
+                    left -= chunk[1] - chunk[0]
                     bar.update(chunk[1] - chunk[0])
-        except KeyboardInterrupt:
-            kept = plants - sum(last - first for first, last in file.missing)
-            click.echo(f"{kept} of {plants} plants are kept in {file.folder}; the same command goes on", err=True)
-            raise
+                    kept = f"{plants - left} of {plants} plants are kept in {file.folder}"
+                    process.leaves(f"{kept}; the same command goes on")
         finally:
             done.close()
     file.finish()
+    process.leaves(process.NOTHING_LOST)
     summary = campaign_tables(output)["campaign_summary"]
     click.echo(_promised(summary))
     click.echo(f"{plants} plants within W_a -> {output}; limits +-{limit:.6g}, {campaign.horizon_s:.6g} s each")
