@@ -84,7 +84,7 @@ SLOW = (
     "@main.command()\n"
     "@click.option('--bar', is_flag=True)\n"
     "def slow(bar):\n"
-    "    click.echo('begins')\n"
+    "    click.echo('begins\\x07')\n"
     "    with tqdm(desc='counted', disable=None if bar else True, leave=False): time.sleep(2.8)\n"
     "    click.echo('ends')\n"
     "main(['slow', *sys.argv[1:]])\n"
@@ -93,7 +93,9 @@ SLOW = (
 
 def test_a_command_without_a_bar_of_its_own_shows_the_time_it_takes() -> None:
     """Every command, since all are of one class."""
-    assert re.search(r"at work: 00:0\d", on_terminal(["-c", SLOW]))
+    shown = on_terminal(["-c", SLOW])
+    assert "at work: 00:02" in shown
+    assert re.search(r"\r +\rbegins\\x07\r\nends\r\n$", shown)
     assert "at work" not in on_terminal(["-c", SLOW, "--bar"])
     assert to_pipes(["-c", SLOW]).stderr == ""
 
