@@ -13,17 +13,15 @@ from experiments.campaign.command import plant_options
 from experiments.options import DESIGN, OUTPUT_FOLDER, positive_limit
 from experiments.tables import write_into
 from experiments.thesis.claims.commands import claims_command, coverage_command, equations_command
+from identification.base.command_line import CommandGroup
 from identification.base.errors import InputError
 
 LIMIT = click.option("--limit", type=float, help="Saturation limits +-LIMIT, instead of the thesis's.")
 
 
-@click.group("thesis")
+@click.group("thesis", cls=CommandGroup)
 def thesis() -> None:
-    """Reproduce and judge the print: its experiments, claims and equations.
-
-    The option --refusal FILE stands before the word thesis.
-    """
+    """Reproduce and judge the print: its experiments, claims and equations."""
 
 
 thesis.add_command(claims_command)

@@ -69,14 +69,16 @@ def _held(lock: Path, target: Path) -> Iterator[None]:
     holder = FileLock(lock, timeout=0)
     try:
         holder.acquire()
-        lock.write_text(f"{os.getpid()}\n{platform.node()}\n", encoding="utf-8")
     except Timeout:
         raise InputError(f"{target}: {_holder(lock)} is writing it; expected none, wait for its end") from None
     except OSError as error:
-        holder.release()
         raise InputError(f"{target}: cannot be written ({error.strerror})") from None
     try:
         with removed_at_the_end(lock):  # before it is let go: the next one's file has the same name
+            try:
+                lock.write_text(f"{os.getpid()}\n{platform.node()}\n", encoding="utf-8")
+            except OSError as error:
+                raise InputError(f"{target}: cannot be written ({error.strerror})") from None
             yield
     finally:
         holder.release()

@@ -43,7 +43,7 @@ def summaries(outcomes: Mapping[str, pd.DataFrame | str]) -> dict[str, pd.DataFr
 
 
 def read_attempts(stems: Mapping[str, Path], end: str, read: Callable[[Path], Result]) -> dict[str, Result | str]:
-    """Return what commands wrote, or the sentences with which they refused, as ``--refusal`` keeps them.
+    """Return what commands wrote, or the sentences with which they refused, as a build keeps them.
 
     Parameters
     ----------

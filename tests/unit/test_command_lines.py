@@ -55,9 +55,6 @@ def test_a_command_of_the_print_is_named_where_it_is(runner: CliRunner, name: st
 
 def test_no_other_command_is(runner: CliRunner) -> None:
     refused(runner.invoke(experiments_main, ["limit"]), "No such command 'limit'")
-    assert (
-        "--refusal FILE stands before the word thesis" in runner.invoke(experiments_main, ["thesis", "--help"]).output
-    )
 
 
 EPSILON = ["--epsilon", "1e-4"]

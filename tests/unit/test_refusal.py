@@ -1,4 +1,4 @@
-"""``--refusal FILE``: a refusal is kept, a missing input is passed over, everything else is as without it."""
+"""How a command ends: a refusal is one sentence and status 2, a crash is none; write-protected files need --force."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from pathlib import Path
 import click
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
 
-from design.__main__ import main as design
+from antiwindup.__main__ import BUILDS, ROOMS
+from antiwindup.__main__ import main as antiwindup
 from identification.base.command_line import CommandGroup
 from identification.base.errors import InputError
-from identification.base.files import read_text
-from paper_figures.__main__ import main as paper_figures
+from identification.base.files import write_whole
 
 
 @click.group(cls=CommandGroup)
@@ -33,13 +33,13 @@ def end(how: str) -> None:
         np.exp(np.array([1e4]))
     if how == "crash":
         raise RuntimeError(how)
-    if how.endswith(".json"):
-        read_text(Path(how))
 
 
-def run(kept: Path, *arguments: str) -> Result:
-    kept.write_text("a refusal of yesterday\n", encoding="utf-8")
-    return CliRunner().invoke(group, ["--refusal", str(kept), "end", *arguments])
+@group.command()
+@click.option("--output", type=click.Path(path_type=Path))
+def write(output: Path) -> None:
+    """Write a file."""
+    write_whole({output: lambda path: path.write_text("new", encoding="utf-8")})
 
 
 @pytest.mark.parametrize(
@@ -50,69 +50,43 @@ def run(kept: Path, *arguments: str) -> Result:
         ("overflow", "the numbers given are too extreme to compute with (overflow encountered in exp)"),
     ],
 )
-def test_a_refusal_is_kept_and_the_exit_status_is_0(tmp_path: Path, how: str, sentence: str) -> None:
-    kept = tmp_path / "model.refused.txt"
-    result = run(kept, how)
-    assert result.exit_code == 0, result.output
-    assert result.stderr == f"Error: {sentence}\n"
-    assert kept.read_text(encoding="utf-8") == f"{sentence}\n"
-    assert [path.name for path in tmp_path.iterdir()] == [kept.name]
-    without = CliRunner().invoke(group, ["end", how])
-    assert (without.exit_code, without.stderr) == (2, result.stderr)
+def test_a_refusal_is_one_sentence_and_status_2(how: str, sentence: str) -> None:
+    result = CliRunner().invoke(group, ["end", how])
+    assert (result.exit_code, result.stdout, result.stderr) == (2, "", f"Error: {sentence}\n")
 
 
-def test_a_success_leaves_no_refusal(tmp_path: Path) -> None:
-    assert run(tmp_path / "model.refused.txt", "well").exit_code == 0
-    assert not list(tmp_path.iterdir())
-
-
-def test_without_an_input_nothing_is_done(tmp_path: Path) -> None:
-    missing = tmp_path / "model.json"
-    result = run(tmp_path / "design.refused.txt", str(missing))
-    assert (result.exit_code, result.stderr) == (0, f"{missing}: no such file; nothing is done\n")
-    assert not list(tmp_path.iterdir())
-    assert CliRunner().invoke(group, ["end", str(missing)]).exit_code == 2
-
-
-def test_a_crash_and_a_wrong_option_are_no_refusals(tmp_path: Path) -> None:
-    kept = tmp_path / "model.refused.txt"
-    assert isinstance(run(kept, "crash").exception, RuntimeError)
-    wrong = run(kept, "well", "--no-such-option")
+def test_a_crash_and_a_wrong_option_are_no_refusals() -> None:
+    assert isinstance(CliRunner().invoke(group, ["end", "crash"]).exception, RuntimeError)
+    wrong = CliRunner().invoke(group, ["end", "well", "--no-such-option"])
     assert wrong.exit_code == 2
     assert "No such option" in wrong.stderr
-    assert not list(tmp_path.iterdir())
 
 
-def test_a_refusal_that_cannot_be_kept_is_one(tmp_path: Path) -> None:
-    for how in ("refused", "well"):
-        result = CliRunner().invoke(group, ["--refusal", str(tmp_path / "nowhere" / "r.refused.txt"), "end", how])
-        assert result.exit_code == 2
-        assert "cannot be written" in result.stderr
+def test_a_write_protected_file_is_replaced_with_force(tmp_path: Path) -> None:
+    output = tmp_path / "kept.txt"
+    output.write_text("old", encoding="utf-8")
+    output.chmod(0o444)
+    refused = CliRunner().invoke(group, ["write", "--output", str(output)])
+    assert refused.exit_code == 2
+    assert f"{output}: is write-protected; expected a file that may be replaced, or --force" in refused.stderr
+    assert output.read_text(encoding="utf-8") == "old"
+    assert CliRunner().invoke(group, ["write", "--output", str(output), "--force"]).exit_code == 0
+    assert output.read_text(encoding="utf-8") == "new"
 
 
-def test_nothing_but_a_refusal_is_removed(tmp_path: Path) -> None:
-    """Not an input, an output, a link nor a device that was given by mistake."""
-    design, link, folder = tmp_path / "design.json", tmp_path / "a.refused.txt", tmp_path / "b.refused.txt"
-    design.write_text("{}", encoding="utf-8")
-    link.symlink_to(design)
-    folder.mkdir()
-    for given in (design, link, folder, Path("/dev/null"), Path()):
-        result = CliRunner().invoke(group, ["--refusal", str(given), "end", "well"])
-        assert result.exit_code == 2, given
-    assert design.read_text(encoding="utf-8") == "{}"
-    assert link.is_symlink()
-    assert Path("/dev/null").is_char_device()
+def commands(found: click.Command, name: str) -> dict[str, click.Command]:
+    if not isinstance(found, click.Group):
+        return {name: found}
+    below = [
+        (each, found.get_command(click.Context(found), each)) for each in found.list_commands(click.Context(found))
+    ]
+    return {path: command for each, one in below if one for path, command in commands(one, f"{name} {each}").items()}
 
 
-def test_the_commands_of_make_pass_over_what_was_not_made(tmp_path: Path) -> None:
-    chosen = ["--period", "4", "--epsilon", "1e-4", "--output", str(tmp_path / "design.json")]
-    drawn = ["fig_2_10", "--results", str(tmp_path), "--output", str(tmp_path)]
-    refusal = ["--refusal", str(tmp_path / "command.refused.txt")]
-    for main, arguments in (
-        (design, ["delay-free", str(tmp_path / "model.json"), *chosen]),
-        (paper_figures, ["draw", *drawn]),
-    ):
-        result = CliRunner().invoke(main, [*refusal, *arguments])
-        assert result.exit_code == 0, result.output
-        assert "nothing is done" in result.stderr
-        assert not list(tmp_path.iterdir())
+def test_every_command_that_writes_takes_force() -> None:
+    every = commands(antiwindup, "antiwindup")
+    assert {path.split()[1] for path in every} == {*BUILDS, *ROOMS}
+    without = {
+        path for path, command in every.items() if all("--force" not in option.opts for option in command.params)
+    }
+    assert without == {"antiwindup design audit"}
