@@ -12,7 +12,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from identification.base.files import write_protected_too
-from identification.base.process import begin, begins_children, leave_signals_to_parent
+from identification.base.process import begin, leave_signals_to_parent, undisturbed
 
 PACKAGES = [
     "flint",
@@ -47,7 +47,7 @@ def start(command: Sequence[str], log: Path, force: bool) -> BaseProcess:
     os.environ["PYTHONSAFEPATH"] = "1"  # the processes import nothing from the folder that they happen to run in
     context.set_forkserver_preload(PACKAGES)
     process: BaseProcess = context.Process(target=_run, args=(tuple(command), str(log), force))
-    with begins_children:
+    with undisturbed:
         process.start()
     return process
 

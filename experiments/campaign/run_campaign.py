@@ -17,6 +17,7 @@ from experiments.campaign.run_plants import Campaign, code_sha256
 from experiments.campaign.workers import run_here, run_on_cluster
 from experiments.runs.guarantee import sector_text
 from experiments.runs.references import Reference
+from identification.base import process
 from identification.base.errors import InputError
 from identification.base.files import read_bytes
 from identification.base.folder_lock import locked_file
@@ -87,13 +88,12 @@ def _complete(file: CampaignFile, campaign: Campaign, plants: int, scheduler: st
                     file.keep(chunk, columns)
                     left -= chunk[1] - chunk[0]
                     bar.update(chunk[1] - chunk[0])
-        except KeyboardInterrupt:
-            kept = f"{plants - left} of {plants} plants are kept in {file.folder}"
-            click.echo(f"{kept}; the same command goes on", err=True)
-            raise
+                    kept = f"{plants - left} of {plants} plants are kept in {file.folder}"
+                    process.leaves(f"{kept}; the same command goes on")
         finally:
             done.close()
     file.finish()
+    process.leaves(process.NOTHING_LOST)
 
 
 def _promised(summary: pd.DataFrame) -> str:

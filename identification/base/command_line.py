@@ -11,7 +11,7 @@ from typing import Any
 import click
 import numpy as np
 
-from identification.base.console import Console
+from identification.base.console import Console, escaped
 from identification.base.errors import InputError
 from identification.base.files import write_protected_too
 
@@ -92,6 +92,5 @@ def _forced(ctx: click.Context, _param: click.Parameter, is_asked: bool) -> None
 
 
 def plain(sentence: str) -> str:
-    """A sentence for a terminal: characters that do not print as escapes, what is quoted cut at QUOTED characters."""
-    shown = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in sentence)
-    return re.sub(rf"(?<!\w)'([^']{{{QUOTED}}})[^']+'(?!\w)", r"'\1...'", shown)
+    """A sentence for a terminal, and what it quotes cut at QUOTED characters."""
+    return re.sub(rf"(?<!\w)'([^']{{{QUOTED}}})[^']+'(?!\w)", r"'\1...'", escaped(sentence))

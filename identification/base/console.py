@@ -42,7 +42,7 @@ class Console(click.Group):
             status = error.exit_code
             with suppress(OSError):  # nobody is told, but by the status
                 error.show()
-        _print(printed.getvalue())
+        _print(escaped(printed.getvalue(), but="\n"))
         _flush_errors(status)
         sys.exit(status)
 
@@ -56,10 +56,16 @@ def _show_that_it_works(thread: Thread) -> None:
         return
     from tqdm import tqdm
 
-    with tqdm(desc="at work", bar_format="{desc}: {elapsed}", leave=False, delay=1e9) as bar:
+    with tqdm(desc="at work", bar_format="{desc}: {elapsed}", leave=False, delay=1e-9) as bar:  # not shown yet
+        bar.start_t -= PATIENCE_S
         while thread.is_alive():
             (bar.refresh if list(tqdm._instances) == [bar] else bar.clear)()  # type: ignore[attr-defined]
             thread.join(EVERY_S)
+
+
+def escaped(text: str, but: str = "") -> str:
+    """A text for a terminal: characters that do not print, which a file or a name may hold, as escapes."""
+    return "".join(letter if letter.isprintable() or letter in but else repr(letter)[1:-1] for letter in text)
 
 
 def _print(text: str) -> None:
