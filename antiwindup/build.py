@@ -140,9 +140,12 @@ class Build:
             return True
         self._made.append(step)
         folder.begin(source, step.outputs)
+        for path in step.outputs:
+            if self.force and not path.is_dir():  # which the command refuses
+                path.unlink(missing_ok=True)
         closing = ExitStack()
         log = closing.enter_context(partial_file(self.path, ".log"))
-        process = start(step.command, log, self.force)
+        process = start(step.command, log)
         self._running[process.sentinel] = _Running(step, source, process, log, closing)
         return False
 
