@@ -17,6 +17,7 @@ from click.core import ParameterSource
 from identification.__main__ import fit_options
 from identification.base.command_line import together
 from identification.base.errors import InputError, MissingFile
+from identification.base.files import is_file, true_path
 
 if TYPE_CHECKING:
     from antiwindup.steps import Asked, Step
@@ -100,7 +101,7 @@ def _asked(
     from antiwindup.steps import Asked
     from identification.sweeps.read_sweeps import input_files
 
-    if not output or Path(output).resolve() == Path(Path(output).resolve().anchor):
+    if not output or true_path(Path(output)) == Path(true_path(Path(output)).anchor):
         raise InputError(f"--output is {output!r}; expected a folder for the outputs alone")
     if limit is not None and not 0 < limit < inf:
         raise InputError(f"--limit is {limit:g}; expected a positive number")
@@ -121,7 +122,7 @@ def _asked(
     ]
     asked = Asked(Path(output), model, sweeps, tuple(input_files(sweeps)), tuple(words), limit, plants)
     for path in (*asked.sweep_files, *(asked.model_files if model else ())):
-        if not path.is_file():
+        if not is_file(path):
             raise MissingFile(f"{path}: no such file; expected a sweep, or a model.json, table or implied")
     return asked, {"jobs": jobs or os.cpu_count() or 1, "force": force}
 

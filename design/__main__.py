@@ -22,15 +22,14 @@ from design.choices import METHODS, SECTOR
 from identification.base.command_line import CommandGroup, together
 from identification.base.digits import lower_end, upper_end
 from identification.base.errors import InputError
-from identification.base.files import write_whole
+from identification.base.files import require_writable, write_whole
+from identification.base.path_types import INPUT_FILE, OUTPUT_FILE
 
 if TYPE_CHECKING:
     from design.design_file import Design
 
-OUTPUT = click.option(
-    "--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="design.json to write."
-)
-DESIGN = click.argument("design", type=click.Path(path_type=Path, dir_okay=False))
+OUTPUT = click.option("--output", type=OUTPUT_FILE, required=True, help="design.json to write.")
+DESIGN = click.argument("design", type=INPUT_FILE)
 corrected_options = together(
     click.option(
         "--recovery",
@@ -83,6 +82,7 @@ def delay_free(
     from design.asked_model import asked_model
     from design.chapter_2.design_delay_free import design_delay_free
 
+    require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
     design = design_delay_free(given, period, epsilon, recovery, sector, bandwidth)
     hinf = design.hinf
@@ -141,6 +141,7 @@ def extended(
     if len(e) != len(f):
         raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected as many")
     pairs = list(zip(e, f, strict=True))
+    require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
     design = design_extended(
         given,

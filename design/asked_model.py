@@ -6,6 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from identification.base.errors import InputError
+from identification.base.files import is_folder, is_there
 from identification.model.model_file import IdentifiedModel, read_model
 
 
@@ -18,10 +19,10 @@ def asked_model(name: str) -> IdentifiedModel:
         As :func:`identification.model.model_file.read_model` and :func:`data.thesis.model_named`; or something else
         is named data here and hides the sets.
     """
-    if Path(name).exists() or not name.isidentifier():
+    if is_there(Path(name)) or not name.isidentifier():
         return read_model(Path(name))
     data = find_spec("data")
-    if data is not None and data.origin is not None and not Path(data.origin).with_name("thesis").is_dir():
+    if data is not None and data.origin is not None and not is_folder(Path(data.origin).with_name("thesis")):
         raise InputError(f"{name}: no such file, nor can it be one of the thesis's sets, which {data.origin} hides")
     from data.thesis import model_named
 

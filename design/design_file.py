@@ -14,7 +14,7 @@ from design.anti_windup.judge import Compensator, CorrectedCompensator, PrintedC
 from design.blocks.block import Block, plant_denominator
 from design.hinf.mixed_sensitivity import Synthesis
 from design.parameters import DelayFreeParameters, ExtendedParameters
-from identification.base.errors import InputError
+from identification.base.errors import InputError, shown
 from identification.base.json_object import member, number, read_json
 from identification.model.plant import AdditiveBound, PlantModel
 from identification.model.plant_json import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
@@ -77,7 +77,7 @@ class Design:
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
-            raise InputError(f"kind is {self.kind!r}; expected one of {', '.join(KINDS)}")
+            raise InputError(f"kind is {shown(self.kind)}; expected one of {', '.join(KINDS)}")
 
     @property
     def loop_plant(self) -> PlantModel:
@@ -149,7 +149,7 @@ def read_design(path: Path | str, kind: str | None = None) -> Design:
     content = read_json(Path(path), SCHEMA)
     try:
         if content.get("kind") not in KINDS:
-            raise InputError(f"kind is {content.get('kind')!r}; expected one of {', '.join(KINDS)}")
+            raise InputError(f"kind is {shown(content.get('kind'))}; expected one of {', '.join(KINDS)}")
         if kind not in (None, content["kind"]):
             raise InputError(f"kind is '{content['kind']}'; expected '{kind}'")
         delay_free = content["kind"] == "delay-free"
@@ -196,7 +196,7 @@ def _omegas(content: Mapping[str, Any]) -> tuple[float, ...]:
     """The member reference_omegas; raises InputError when it is no list of numbers that are not negative."""
     given = content.get("reference_omegas")
     if not isinstance(given, list) or not given:
-        raise InputError(f"reference_omegas is {given!r}; expected a list of numbers")
+        raise InputError(f"reference_omegas is {shown(given)}; expected a list of numbers")
     omegas = tuple(number({"reference_omegas": omega}, "reference_omegas") for omega in given)
     if min(omegas) < 0:
         raise InputError(f"reference_omegas has {min(omegas):g}; expected no negative number")

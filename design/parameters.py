@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from identification.base.errors import InputError
+from identification.base.errors import InputError, shown
 from identification.base.json_object import member, number, numbers, record, whole, words
 
 
@@ -130,7 +130,7 @@ class ExtendedParameters:
 def _pairs(content: Mapping[str, Any]) -> tuple[tuple[float, float], ...]:
     given = content.get("pairs")
     if not isinstance(given, list) or not all(isinstance(pair, list) and len(pair) == 2 for pair in given):
-        raise InputError(f"'pairs' is {given!r}; expected a list of pairs of numbers")
+        raise InputError(f"'pairs' is {shown(given)}; expected a list of pairs of numbers")
     return tuple((number({"pairs": e}, "pairs"), number({"pairs": f}, "pairs")) for e, f in given)
 
 

@@ -21,6 +21,7 @@ from experiments.run_commands import sampled_command, simulate_command
 from experiments.tables import write_into
 from experiments.thesis.commands import thesis
 from identification.base.command_line import CommandGroup
+from identification.base.path_types import INPUT_FILE
 
 
 class Experiments(CommandGroup):
@@ -47,7 +48,7 @@ main.add_command(thesis)
 
 
 @main.command("campaign-tables")
-@click.argument("campaign", type=click.Path(path_type=Path, dir_okay=False))
+@click.argument("campaign", type=INPUT_FILE)
 @OUTPUT_FOLDER
 def campaign_distributions(campaign: Path, output: Path) -> None:
     """The distributions of a CAMPAIGN: campaign.csv, campaign_distance.csv, campaign_summary.csv."""

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
+from identification.base import path_types
 from identification.base.command_line import together
 from identification.base.errors import InputError
 
-DESIGN = click.argument("design", type=click.Path(path_type=Path, dir_okay=False))
+DESIGN = click.argument("design", type=path_types.INPUT_FILE)
 OUTPUT_FOLDER = click.option(
-    "--output", type=click.Path(path_type=Path, file_okay=False), required=True, help="Existing folder for the tables."
+    "--output", type=path_types.OUTPUT_FOLDER, required=True, help="Existing folder for the tables."
 )
 sinusoid_options = together(
     click.option("--amplitude", type=float, multiple=True, help="Of the reference; once a frequency of DESIGN."),
@@ -29,7 +28,7 @@ reference_options = together(
     ),
     click.option(
         "--reference",
-        type=click.Path(path_type=Path, dir_okay=False),
+        type=path_types.INPUT_FILE,
         help="CSV of time_s and reference, joined by straight lines, instead of the sinusoids.",
     ),
 )

@@ -12,6 +12,8 @@ from experiments.options import DESIGN, positive_limit, reference_options
 from experiments.tables import write_tables
 from identification.base.command_line import together
 from identification.base.errors import InputError
+from identification.base.files import require_writable
+from identification.base.path_types import OUTPUT_FILE
 
 MOST_ROWS = 1e7
 SHARE = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"  # of a run, in a bar
@@ -25,7 +27,7 @@ _run_options = together(
     click.option(
         "--plant", help="The true plant: a model.json, table or implied; the design's own model unless given."
     ),
-    click.option("--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV to write."),
+    click.option("--output", type=OUTPUT_FILE, required=True, help="CSV to write."),
 )
 
 
@@ -72,6 +74,8 @@ def simulate_command(
     numbers = {name: value for name, value in (("alpha", alpha), ("beta", beta), ("gamma", gamma)) if value is not None}
     if numbers and anti_windup != "thesis":
         raise InputError(f"--{next(iter(numbers))} belongs to --anti-windup thesis; found --anti-windup {anti_windup}")
+    inputs = _inputs(design, plant, reference["reference"])
+    require_writable(output, inputs=inputs)
     content = read_design(design)
     kind = content.chosen(anti_windup)
     if numbers:
@@ -98,7 +102,7 @@ def simulate_command(
     if kind is not None:
         given = guarantee(content, kind, true)
         promised = str(judge_run(given, loop, limits, run, asked, true or content.loop_plant))
-    write_tables({output: table}, _inputs(design, plant, reference["reference"]))
+    write_tables({output: table}, inputs)
     saturated = last_saturation(run)
     said = "saturated to the end" if np.isnan(saturated) else f"last saturated at {saturated:.6g} s"
     if not len(run.events_s) and not np.isnan(saturated):
@@ -145,6 +149,8 @@ def sampled_command(
     positive_limit(limit)
     drive = Drive(rate, method, (-limit, limit), quantum, slew, input_delay)
     _require_few_rows(until * rate)
+    inputs = _inputs(design, plant, reference["reference"])
+    require_writable(output, inputs=inputs)
     content = read_design(design)
     kind = content.chosen(anti_windup)
     asked = reference_of(content, **reference)
@@ -160,7 +166,7 @@ def sampled_command(
         promised = str(found)
         if found.covered:
             promised = f"Within the guarantee of continuous time, which knows no computer and no drive: {found.needs}"
-    write_tables({output: pd.DataFrame(vars(run))}, _inputs(design, plant, reference["reference"]))
+    write_tables({output: pd.DataFrame(vars(run))}, inputs)
     click.echo(_first(promised, f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}"))
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from identification.base.errors import InputError
-from identification.base.files import read_text, write_whole
+from identification.base.files import read_text, require_folder, write_whole
 
 if TYPE_CHECKING:  # a command line need not wait for it
     import pandas as pd
@@ -28,8 +28,7 @@ def write_into(folder: Path, tables: Mapping[str, pd.DataFrame]) -> None:
     InputError
         There is no such folder, or see :func:`write_tables`.
     """
-    if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder")
+    require_folder(folder)
     write_tables({folder / f"{name}.csv": table for name, table in tables.items()})
 
 

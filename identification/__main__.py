@@ -16,7 +16,8 @@ from pathlib import Path
 import click
 
 from identification.base.command_line import CommandGroup, together
-from identification.base.files import write_whole
+from identification.base.files import require_writable, write_whole
+from identification.base.path_types import INPUT, OUTPUT_FILE
 from identification.model.plant import HIGHEST_ORDER
 
 
@@ -76,11 +77,11 @@ fit_options = together(
 
 
 @main.command()
-@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--output", required=True, type=click.Path(path_type=Path), help="The model.json to write.")
+@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)
+@click.option("--output", required=True, type=OUTPUT_FILE, help="The model.json to write.")
 @click.option(
     "--responses",
-    type=click.Path(path_type=Path),
+    type=OUTPUT_FILE,
     help="Keep the responses in this .npz, to be given as a SWEEP later.",
 )
 @fit_options
@@ -104,6 +105,8 @@ def fit(
     from identification.sweeps.kept_responses import write_responses
     from identification.sweeps.read_sweeps import input_files, read_sweeps
 
+    files = input_files(sweeps)
+    require_writable(output, *([] if responses is None else [responses]), inputs=files)
     tests = read_sweeps(sweeps)
     with tqdm(desc="fits", unit="", disable=None, leave=False) as bar:
         wanted = Wanted(None if integrators == "auto" else int(integrators), modes, real)
@@ -113,7 +116,7 @@ def fit(
     writers: dict[Path, Callable[[Path], object]] = {output: lambda path: path.write_text(text, encoding="utf-8")}
     if responses is not None:
         writers[responses] = lambda path: write_responses(path, fitted.tests)
-    write_whole(writers, inputs=input_files(sweeps))
+    write_whole(writers, inputs=files)
     bound = [bound_text(fitted.model.additive_bound), *bound_remarks(fitted.bound_fit)]
     click.echo("\n".join([table(fitted.plant_fit), *bound, *check_lines(fitted.checks)]))
 

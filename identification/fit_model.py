@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import index
 
-from identification.base.errors import InputError
+from identification.base.errors import InputError, shown
 from identification.bound.bound_residuals import bound_residuals
 from identification.fitting.fit_plant import FitResult, fit_plant
 from identification.fitting.subspace_check import check_modes
@@ -107,7 +107,7 @@ def fit(
         A number is none of these, or see :func:`fit_model`.
     """
     if integrators is not None and integrators not in (0, 1, 2):
-        raise InputError(f"integrators is {integrators!r}; expected 0, 1 or 2")
+        raise InputError(f"integrators is {shown(integrators)}; expected 0, 1 or 2")
     wanted = Wanted(integrators, _pair("modes", modes, MOST_MODES), _pair("real", real, 1))
     given = [tests] if isinstance(tests, FrequencyResponse) else tests
     return fit_model(given, wanted, soft=soft, bound_order=bound_order, seed=seed).model
@@ -123,7 +123,7 @@ def _pair(name: str, count: int | Sequence[int] | None, most: int) -> tuple[int,
     except (TypeError, ValueError):
         pair = -1, -1
     if not all(0 <= each <= most for each in pair):
-        raise InputError(f"{name} is {count!r}; expected a number from 0 to {most}, or a pair of zeros and poles")
+        raise InputError(f"{name} is {shown(count)}; expected a number from 0 to {most}, or a pair of zeros and poles")
     return pair
 
 

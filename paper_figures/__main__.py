@@ -15,6 +15,7 @@ from pathlib import Path
 import click
 
 from identification.base.command_line import CommandGroup
+from identification.base.path_types import INPUT, INPUT_FILE, OUTPUT_FOLDER
 
 
 @click.group(cls=CommandGroup)
@@ -26,33 +27,32 @@ def main() -> None:
 @click.argument("names", metavar="NAME...", nargs=-1, required=True)
 @click.option(
     "--results",
-    type=click.Path(path_type=Path),
+    type=INPUT,
     required=True,
     help="Folder of the tables that the experiments wrote.",
 )
-@click.option("--output", type=click.Path(path_type=Path), required=True, help="Existing folder to write to.")
+@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write to.")
 def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
     """Draw the figures NAME..., such as fig_2_01, each as PDF, SVG and PNG with its caption as text."""
     from paper_figures.look import style
-    from paper_figures.result_tables import missing_columns_named, read_table
+    from paper_figures.result_tables import read_table, sentences_of
     from paper_figures.thesis.figure_registry import figure_module
 
-    drawn = {}
+    files: dict[Path, bytes] = {}
     for name in names:
         module = figure_module(name)
         tables = {table: read_table(results / f"{table}.csv", name) for table in module.TABLES}
-        with style.styled(), missing_columns_named(tables, results, name):
-            drawn[name] = module.draw(tables), module.caption(tables)
-    for name, (figure, caption) in drawn.items():
-        style.save(figure, output, name, caption)
+        with style.styled(), sentences_of(tables, results, name):
+            files |= style.rendered(module.draw(tables), output, name, module.caption(tables))
+    style.write(files)
 
 
 @main.command("summary")
-@click.argument("model", type=click.Path(path_type=Path, dir_okay=False))
-@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("model", type=INPUT_FILE)
+@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)
 @click.option(
     "--build",
-    type=click.Path(path_type=Path),
+    type=OUTPUT_FOLDER,
     required=True,
     help="Existing folder of the designs, with the tables in its folder results; to write to, too.",
 )
@@ -62,7 +62,7 @@ def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
     from identification.sweeps.read_sweeps import read_sweeps
     from identification.sweeps.response import alias_free
     from paper_figures.look import style
-    from paper_figures.result_tables import missing_columns_named
+    from paper_figures.result_tables import sentences_of
     from paper_figures.summary import page
     from paper_figures.summary.build_folder import read_build, summaries
     from paper_figures.summary.words import summarise
@@ -70,44 +70,47 @@ def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
     identified = read_model(model)
     tests = [alias_free(test, identified.plant) for test in read_sweeps(sweeps)]
     designs, outcomes = read_build(build, "summary")
-    with missing_columns_named(summaries(outcomes), build / "results", "summary"):
+    with sentences_of(summaries(outcomes), build / "results", "summary", model):
         said = summarise(identified, tests, designs, outcomes)
-    figure = page.draw(said, identified, tests)
-    style.save(figure, build, "summary", said.text())
+        files = style.rendered(page.draw(said, identified, tests), build, "summary", said.text())
+    style.write(files)
     click.echo(f"{len(tests)} test{'s' if len(tests) > 1 else ''} -> {build / 'summary.pdf'}")
     for head, sentence in said.refused:
         click.echo(f"{head}: {sentence}")
 
 
 @main.command("bode")
-@click.argument("model", type=click.Path(path_type=Path, dir_okay=False))
-@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--output", type=click.Path(path_type=Path), required=True, help="Existing folder to write to.")
+@click.argument("model", type=INPUT_FILE)
+@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)
+@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write to.")
 def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
     """Draw SWEEP files, MODEL and the distances under W_a: bode.pdf, .svg and .png, with a caption in bode.txt."""
     from identification.model.model_file import read_model
     from identification.sweeps.read_sweeps import read_sweeps
     from paper_figures.look.bode import plot_bode
-    from paper_figures.look.style import save
+    from paper_figures.look.style import rendered, write
+    from paper_figures.result_tables import sentences_of
 
     identified, tests = read_model(model), read_sweeps(sweeps)
     names = ", ".join(test.name + (" (synthetic)" if test.synthetic else "") for test in tests)
     caption = f"Magnitude and phase of {names} and of the model {model.name}, and their distance under the bound W_a."
-    save(plot_bode(identified, tests), output, "bode", caption)
+    with sentences_of({}, output, "bode", model):
+        files = rendered(plot_bode(identified, tests), output, "bode", caption)
+    write(files)
 
 
 @main.command("report")
 @click.argument("model")
-@click.argument("sweeps", metavar="[SWEEP]...", nargs=-1, type=click.Path(path_type=Path))
+@click.argument("sweeps", metavar="[SWEEP]...", nargs=-1, type=INPUT)
 @click.option(
     "--build",
-    type=click.Path(path_type=Path),
+    type=OUTPUT_FOLDER,
     required=True,
     help="Existing folder of claims.csv, the designs, results and figures; to write report/index.html to.",
 )
 def report_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
     """Put all that was made for MODEL (a model.json, table or implied) and SWEEP files on one page of HTML."""
-    from paper_figures.result_tables import missing_columns_named
+    from paper_figures.result_tables import sentences_of
     from paper_figures.summary.build_folder import read_build, summaries
     from paper_figures.thesis.figure_registry import figure_module, figure_names
     from paper_figures.thesis.report.content import report_content
@@ -117,7 +120,7 @@ def report_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
     designs, outcomes = read_build(build, "report")
     figures = {name: figure_module(name).TABLES for name in figure_names()}
     inputs = read_inputs(model, sweeps, build, figures, designs, outcomes)
-    with missing_columns_named(summaries(outcomes), build / "results", "report"):
+    with sentences_of(summaries(outcomes), build / "results", "report", Path(model)):
         content = report_content(inputs)
     click.echo(f"{len(content.rows)} claims, {len(figures)} figures -> {write_report(content, build, inputs.files)}")
 

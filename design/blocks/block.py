@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.base.arrays import Complex
-from identification.base.errors import InputError
+from identification.base.errors import InputError, shown
 from identification.base.json_object import number
 from identification.model.plant import AdditiveBound, Mode, PlantModel
 from identification.model.python_control import from_control, to_control
@@ -44,7 +44,9 @@ class Block:
         object.__setattr__(self, "zeros", _paired(self.zeros))
         object.__setattr__(self, "poles", _paired(self.poles))
         if not (math.isfinite(self.gain) and math.isfinite(self.delay_s)):
-            raise InputError(f"a block has gain {self.gain!r} and delay {self.delay_s!r}; expected finite numbers")
+            raise InputError(
+                f"a block has gain {shown(self.gain)} and delay {shown(self.delay_s)}; expected finite numbers"
+            )
         if self.delay_s < 0:
             raise InputError(f"a block has the delay {self.delay_s:g} s; expected zero or more (it must be causal)")
 

@@ -10,6 +10,7 @@ import click
 from experiments.options import DESIGN, positive_limit, sinusoid_options
 from identification.base.command_line import together
 from identification.base.errors import InputError
+from identification.base.path_types import OUTPUT_FILE
 
 MOST_PERIODS = 10**4
 
@@ -20,9 +21,7 @@ plant_options = together(
         "--seed", type=int, required=True, help="Of the random numbers; plant i is the same in every campaign."
     ),
     click.option("--scheduler", metavar="ADDRESS", help="Run on the Dask cluster with this scheduler, not here."),
-    click.option(
-        "--output", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Parquet file to write."
-    ),
+    click.option("--output", type=OUTPUT_FILE, required=True, help="Parquet file to write."),
     click.option("--anew", is_flag=True, help="Remove what another campaign that was interrupted has kept there."),
 )
 """Which plants a campaign has, and where it runs."""

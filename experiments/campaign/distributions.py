@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 
 from experiments.campaign.seal import SEAL, Seal
-from identification.base.errors import InputError, MissingFile
+from identification.base.errors import InputError
+from identification.base.files import require_readable
 
 RUNS = ("none", "thesis", "corrected")
 MEASURES = {"peak_error": "peak_error_{}", "steady_error": "steady_error_{}", "recovery_s": "recovery_{}_s"}
@@ -103,10 +104,10 @@ def _reading(path: Path) -> Iterator[Any]:
     """The file, open; a damaged one makes Arrow raise whatever it comes upon: its own errors, wrong text, no memory."""
     from pyarrow import parquet
 
-    if not path.is_file():
-        raise MissingFile(f"{path}: no such file")
+    require_readable(path)
     try:
-        yield parquet.ParquetFile(path)
+        with path.open("rb") as opened:  # Arrow takes no name that is not UTF-8
+            yield parquet.ParquetFile(opened)
     except InputError:
         raise
     except Exception as error:

@@ -14,7 +14,7 @@ from experiments.engine import integrator
 from experiments.engine.compiled_loop import BRIEF, CompiledLoop, compile_loop
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.watched import Stopped, Tick, watched
-from identification.base.errors import InputError
+from identification.base.errors import InputError, shown
 
 if TYPE_CHECKING:
     from control import TimeResponseData
@@ -70,7 +70,7 @@ def limit_pair(limits: float | Sequence[float]) -> tuple[float, float]:
     """The lower and the upper limit: of one number +- that; raises InputError when there are not one or two."""
     pair = np.atleast_1d(np.asarray(limits, dtype=float))
     if pair.shape not in ((1,), (2,)):
-        raise InputError(f"the limits are {limits!r}; expected one number, or a lower and an upper one")
+        raise InputError(f"the limits are {shown(limits)}; expected one number, or a lower and an upper one")
     return (-float(pair[0]), float(pair[0])) if pair.size == 1 else (float(pair[0]), float(pair[1]))
 
 

@@ -15,6 +15,7 @@ from experiments.tables import write_into
 from experiments.thesis.claims.commands import claims_command, coverage_command, equations_command
 from identification.base.command_line import CommandGroup
 from identification.base.errors import InputError
+from identification.base.path_types import INPUT
 
 LIMIT = click.option("--limit", type=float, help="Saturation limits +-LIMIT, instead of the thesis's.")
 
@@ -76,7 +77,7 @@ def interpolation(design: Path, output: Path) -> None:
 
 
 @thesis.command("robustness")
-@click.argument("designs", metavar="DESIGN...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("designs", metavar="DESIGN...", nargs=-1, required=True, type=INPUT)
 @OUTPUT_FOLDER
 def robustness(designs: tuple[Path, ...], output: Path) -> None:
     """|W_a C S| and the margins of each DESIGN, named by its file: robustness.csv, robustness_summary.csv."""
@@ -139,8 +140,6 @@ def conditions(output: Path) -> None:
 
     from experiments.thesis.unprinted.search import conditions_tables
 
-    if not output.is_dir():
-        raise InputError(f"{output}: no such folder")
     with tqdm(desc="conditions", unit="", disable=None, leave=False) as bar:
         write_into(output, conditions_tables(tick=bar.update))
 
@@ -178,7 +177,7 @@ def campaign(
 
 @thesis.command("additive-error")
 @click.argument("model")
-@click.argument("sweeps", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("sweeps", nargs=-1, required=True, type=INPUT)
 @OUTPUT_FOLDER
 def additive_error(model: str, sweeps: tuple[Path, ...], output: Path) -> None:
     """The additive error of SWEEPS against MODEL: additive_error.csv, additive_error_summary.csv."""

@@ -5,14 +5,15 @@ from __future__ import annotations
 import atexit
 import gc
 import re
+import warnings
 from collections.abc import Callable
 from typing import Any
 
 import click
 import numpy as np
 
-from identification.base.console import Console, escaped
-from identification.base.errors import InputError
+from identification.base.console import Console
+from identification.base.errors import InputError, printable
 from identification.base.files import write_protected_too
 
 QUOTED = 80  # characters of a value in a sentence
@@ -57,6 +58,7 @@ class CommandGroup(Console):
                 click.Option(
                     ["--force"],
                     is_flag=True,
+                    is_eager=True,  # outputs are looked at as they are parsed
                     expose_value=False,
                     callback=_forced,
                     help="Replace write-protected files.",
@@ -67,8 +69,11 @@ class CommandGroup(Console):
     def invoke(self, ctx: click.Context) -> Any:
         atexit.register(gc.freeze)  # without it the interpreter sweeps all modules as it ends: a third of a second
         try:
-            with np.errstate(over="raise"):
-                return super().invoke(ctx)
+            with np.errstate(over="raise"), warnings.catch_warnings(record=True) as held:  # a refusal is one sentence
+                result = super().invoke(ctx)
+            for each in held:
+                warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
+            return result
         except InputError as error:
             raise Refusal(plain(str(error))) from None
         except (ArithmeticError, np.linalg.LinAlgError) as error:
@@ -88,9 +93,9 @@ class CommandGroup(Console):
 
 def _forced(ctx: click.Context, _param: click.Parameter, is_asked: bool) -> None:
     if is_asked:
-        ctx.with_resource(write_protected_too())
+        ctx.find_root().with_resource(write_protected_too())  # which is left even where an option after it is refused
 
 
 def plain(sentence: str) -> str:
-    """A sentence for a terminal, and what it quotes cut at QUOTED characters."""
-    return re.sub(rf"(?<!\w)'([^']{{{QUOTED}}})[^']+'(?!\w)", r"'\1...'", escaped(sentence))
+    """A sentence for a terminal: characters that do not print as escapes, what is quoted cut at QUOTED characters."""
+    return re.sub(rf"(?<!\w)'([^']{{{QUOTED}}})[^']+'(?!\w)", r"'\1...'", printable(sentence))

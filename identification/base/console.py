@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from identification.base import process
+from identification.base.errors import printable_lines
 
 PATIENCE_S = 2.0  # before a terminal is told that a command still works,
 EVERY_S = 0.5  # and how often
@@ -22,7 +23,8 @@ class Console(click.Group):
     """A group that, called as a function, is the command of this process, and ends it.
 
     What the command prints appears when it is done, so that there is nothing of a command that was refused or
-    interrupted. Where standard output takes none of it the status is 1, or as of SIGPIPE where its reader has left.
+    interrupted; control characters, which may come from names, appear as escapes. Where standard output takes none of
+    it the status is 1, or as of SIGPIPE where its reader has left.
     """
 
     def __call__(self, *args: Any, **kwargs: Any) -> NoReturn:
@@ -42,7 +44,7 @@ class Console(click.Group):
             status = error.exit_code
             with suppress(OSError):  # nobody is told, but by the status
                 error.show()
-        _print(escaped(printed.getvalue(), but="\n"))
+        _print(printable_lines(printed.getvalue()))
         _flush_errors(status)
         sys.exit(status)
 
@@ -61,11 +63,6 @@ def _show_that_it_works(thread: Thread) -> None:
         while thread.is_alive():
             (bar.refresh if list(tqdm._instances) == [bar] else bar.clear)()  # type: ignore[attr-defined]
             thread.join(EVERY_S)
-
-
-def escaped(text: str, but: str = "") -> str:
-    """A text for a terminal: characters that do not print, which a file or a name may hold, as escapes."""
-    return "".join(letter if letter.isprintable() or letter in but else repr(letter)[1:-1] for letter in text)
 
 
 def _print(text: str) -> None:

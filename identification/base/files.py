@@ -10,9 +10,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from hashlib import sha256
+from io import StringIO
 from itertools import count
 from pathlib import Path
-from stat import S_ISREG
+from stat import S_ISDIR, S_ISREG
 
 from identification.base.errors import InputError, MissingFile
 from identification.base.process import undisturbed
@@ -30,6 +31,26 @@ def _umask() -> int:
     return mask
 
 
+def is_file(path: Path) -> bool:
+    """Whether there is such a regular file, as far as may be seen; unlike ``path.is_file()`` it raises nothing."""
+    return os.path.isfile(path)  # noqa: PTH113
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is such a folder, as far as may be seen; unlike ``path.is_dir()`` it raises nothing."""
+    return os.path.isdir(path)  # noqa: PTH112
+
+
+def is_there(path: Path) -> bool:
+    """Whether there is anything of that name, as far as may be seen; unlike ``path.exists()`` it raises nothing."""
+    return os.path.exists(path)  # noqa: PTH110
+
+
+def true_path(path: Path) -> Path:
+    """The path with all links followed, as far as may be; unlike ``path.resolve()`` it raises nothing."""
+    return Path(os.path.realpath(path))
+
+
 def read_text(path: Path) -> str:
     """Return the text of a UTF-8 file.
 
@@ -38,16 +59,13 @@ def read_text(path: Path) -> str:
     MissingFile
         There is no such file.
     InputError
-        The file is a folder, may not be read, or is not UTF-8 text.
+        The file is no regular one, may not be read, or is not UTF-8 text.
     """
     try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise MissingFile(f"{path}: no such file") from None
+        with StringIO(read_bytes(path).decode("utf-8"), newline=None) as text:
+            return text.read()
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: byte {error.start} is not UTF-8; expected a text file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
 
 
 def read_bytes(path: Path) -> bytes:
@@ -58,14 +76,82 @@ def read_bytes(path: Path) -> bytes:
     MissingFile
         There is no such file.
     InputError
-        The file is a folder or may not be read.
+        The file is no regular one or may not be read.
     """
+    require_readable(path)
     try:
         return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def require_readable(path: Path) -> None:
+    """Refuse what is no file to read: nothing, a folder, a pipe that would never end.
+
+    Raises
+    ------
+    MissingFile
+        There is no such file.
+    InputError
+        The file is no regular one, or may not be looked at.
+    """
+    try:
+        mode = path.stat().st_mode
     except FileNotFoundError:
         raise MissingFile(f"{path}: no such file") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    if not S_ISREG(mode):
+        found = os.strerror(errno.EISDIR) if S_ISDIR(mode) else "neither file nor folder"
+        raise InputError(f"{path}: cannot be read ({found})")
+    if not os.access(path, os.R_OK):
+        raise InputError(f"{path}: cannot be read ({os.strerror(errno.EACCES)})")
+
+
+def require_folder(folder: Path) -> None:
+    """Refuse a folder that files could not be written into, before anything is computed.
+
+    Raises
+    ------
+    InputError
+        There is no such folder, or it may not be written to.
+    """
+    if not is_folder(folder):
+        raise InputError(f"{folder}: no such folder")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"{folder}: cannot be written to ({os.strerror(errno.EACCES)})")
+
+
+def require_writable(*targets: Path, inputs: Iterable[Path] = ()) -> None:
+    """Refuse what :func:`write_whole` could not write, before anything is computed.
+
+    Parameters
+    ----------
+    targets
+        Files to write.
+    inputs
+        Files to read, which must not be written over.
+
+    Raises
+    ------
+    InputError
+        A target is one of the inputs, is named twice, exists and is no regular file, is write-protected, or its
+        folder is missing or may not be written to.
+    """
+    goals = {path: true_path(path) for path in targets}  # a link is followed, not replaced
+    read = {true_path(path) for path in inputs}
+    if len(set(goals.values())) < len(targets):
+        raise InputError(f"{', '.join(map(str, targets))}: two of these are one file; expected different files")
+    for path, goal in goals.items():
+        if goal in read:
+            raise InputError(f"{path}: is an input too; expected another file to write")
+        try:
+            goal.parent.stat()
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+        if not os.access(goal.parent, os.W_OK | os.X_OK):
+            raise InputError(f"{path}: cannot be written ({os.strerror(errno.EACCES)})")
+        require_replaceable(path)
 
 
 @contextmanager
@@ -129,16 +215,10 @@ def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterab
         A target is one of the inputs, is named twice, exists and is no regular file, is write-protected, or may not
         be written.
     """
-    goals = {path: Path(os.path.realpath(path)) for path in writers}  # a link is followed, not replaced
-    read = {os.path.realpath(path) for path in inputs}
-    if len(set(goals.values())) < len(goals):
-        raise InputError(f"{', '.join(map(str, writers))}: two of these are one file; expected different files")
+    require_writable(*writers, inputs=inputs)
+    goals = {path: true_path(path) for path in writers}
     target = next(iter(writers), Path())
     try:
-        for target, goal in goals.items():
-            if str(goal) in read:
-                raise InputError(f"{target}: is an input too; expected another file to write")
-            require_replaceable(target)
         for folder in {goal.parent for goal in goals.values()}:
             _remove_abandoned(folder)
         with ExitStack() as stack:

@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from identification.base.errors import InputError
-from identification.base.files import removed_at_the_end
+from identification.base.files import is_folder, is_there, removed_at_the_end
 
 
 @contextmanager
@@ -27,7 +27,7 @@ def locked_folder(folder: Path) -> Iterator[None]:
     there. Folders that were made and are still empty at the end are removed.
     """
     try:
-        made = [path for path in (folder, *folder.parents) if not path.exists()]
+        made = [path for path in (folder, *folder.parents) if not is_there(path)]
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
@@ -66,7 +66,7 @@ def _held(lock: Path, target: Path) -> Iterator[None]:
     """
     from filelock import FileLock, Timeout
 
-    if not lock.parent.is_dir():
+    if not is_folder(lock.parent):
         raise InputError(f"{target.parent}: no such folder")
     holder = FileLock(lock, timeout=0)
     try:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
-from identification.base.errors import InputError
+from identification.base.errors import InputError, shown
 from identification.base.files import read_text
 
 Record = TypeVar("Record")
@@ -22,18 +23,31 @@ def read_json(path: Path, schema: int) -> dict[str, Any]:
     Raises
     ------
     InputError
-        No such file, not JSON, not an object, or another schema.
+        Another schema, or see :func:`read_object`.
+    """
+    content = read_object(path)
+    if content.get("schema") != schema:
+        raise InputError(f"{path}: schema is {shown(content.get('schema'))}; expected {schema}")
+    return content
+
+
+def read_object(path: Path) -> dict[str, Any]:
+    """Read a JSON object.
+
+    Raises
+    ------
+    InputError
+        No such file, not JSON, not an object, or one within it that names a member twice.
     """
     text = read_text(path)
     try:
-        content = json.loads(text, parse_constant=_refuse_constant)
+        content = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
         raise InputError(f"{path}, line {error.lineno}: not JSON ({error.msg})") from None
     except (RecursionError, ValueError) as error:  # an InputError among them
         raise InputError(f"{path}: {error}") from None
-    found = content.get("schema") if isinstance(content, dict) else None
-    if not isinstance(content, dict) or found != schema:
-        raise InputError(f"{path}: schema is {found!r}; expected {schema}")
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: holds {shown(content)}; expected an object")
     return content
 
 
@@ -63,7 +77,7 @@ def member(content: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     """Return the JSON object at ``key``; raises InputError when there is none."""
     value = content.get(key)
     if not isinstance(value, Mapping):
-        raise InputError(f"'{key}' is {value!r}; expected an object")
+        raise InputError(f"{shown(key)} is {shown(value)}; expected an object")
     return value
 
 
@@ -71,7 +85,7 @@ def objects(content: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
     """Return the list of JSON objects at ``key``; raises InputError when there is none."""
     values = content.get(key)
     if not isinstance(values, list) or not all(isinstance(value, Mapping) for value in values):
-        raise InputError(f"'{key}' is {values!r}; expected a list of objects")
+        raise InputError(f"{shown(key)} is {shown(values)}; expected a list of objects")
     return values
 
 
@@ -79,18 +93,17 @@ def number(content: Mapping[str, Any], key: str) -> float:
     """Return the number at ``key``; raises InputError when there is none."""
     value = content.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"'{key}' is {value!r}; expected a number")
-    try:
-        return float(value)
-    except OverflowError:
-        raise InputError(f"'{key}' is an integer too large for a number") from None
+        raise InputError(f"{shown(key)} is {shown(value)}; expected a number")
+    if not abs(value) <= sys.float_info.max:  # 1e999 is read as inf
+        raise InputError(f"{shown(key)} is {shown(value)}; expected a number of less than 1.8e308")
+    return float(value)
 
 
 def numbers(content: Mapping[str, Any], key: str) -> tuple[float, ...]:
     """Return the list of numbers at ``key``; raises InputError when there is none."""
     values = content.get(key)
     if not isinstance(values, list):
-        raise InputError(f"'{key}' is {values!r}; expected a list of numbers")
+        raise InputError(f"{shown(key)} is {shown(values)}; expected a list of numbers")
     return tuple(number({key: value}, key) for value in values)
 
 
@@ -98,7 +111,7 @@ def whole(content: Mapping[str, Any], key: str) -> int:
     """Return the whole number at ``key``; raises InputError when there is none."""
     value = content.get(key)
     if isinstance(value, bool) or not isinstance(value, int):
-        raise InputError(f"'{key}' is {value!r}; expected a whole number")
+        raise InputError(f"{shown(key)} is {shown(value)}; expected a whole number")
     return value
 
 
@@ -106,7 +119,7 @@ def words(content: Mapping[str, Any], key: str) -> str:
     """Return the text at ``key``; raises InputError when there is none."""
     value = content.get(key)
     if not isinstance(value, str):
-        raise InputError(f"'{key}' is {value!r}; expected a text")
+        raise InputError(f"{shown(key)} is {shown(value)}; expected a text")
     return value
 
 
@@ -114,7 +127,7 @@ def truth(content: Mapping[str, Any], key: str) -> bool:
     """Return the truth value at ``key``; raises InputError when there is none."""
     value = content.get(key)
     if not isinstance(value, bool):
-        raise InputError(f"'{key}' is {value!r}; expected true or false")
+        raise InputError(f"{shown(key)} is {shown(value)}; expected true or false")
     return value
 
 
@@ -125,6 +138,15 @@ def or_none(reader: Reader) -> Reader:
 
 READERS: dict[str, Reader] = {"float": number, "int": whole, "str": words, "bool": truth}
 READERS |= {f"{name} | None": or_none(reader) for name, reader in READERS.items()}
+
+
+def _object(members: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(members)
+    if len(found) < len(members):
+        names = [name for name, _ in members]
+        again = next(name for name in names if names.count(name) > 1)
+        raise InputError(f"an object has several members {shown(again)}; expected each once")
+    return found
 
 
 def _refuse_constant(name: str) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.base.arrays import Complex
-from identification.base.errors import InputError
+from identification.base.errors import InputError, shown
 from identification.model.parameter import Parameter
 from identification.model.python_control import from_control, lowest, to_control
 
@@ -28,7 +28,7 @@ HIGHEST_ORDER = 8
 def _finite(**numbers: float) -> None:
     for name, number in numbers.items():
         if isinstance(number, bool | np.bool_) or not (isinstance(number, Real) and math.isfinite(number)):
-            raise InputError(f"{name} is {number!r}; expected a finite real number")
+            raise InputError(f"{name} is {shown(number)}; expected a finite real number")
 
 
 def _positive(**numbers: float) -> None:
@@ -115,7 +115,7 @@ class PlantModel:
         if self.delay_s < 0:
             raise InputError(f"delay_s is {self.delay_s:g}; expected zero or a positive number of seconds")
         if isinstance(self.integrators, bool) or self.integrators not in (0, 1, 2):
-            raise InputError(f"integrators is {self.integrators!r}; expected 0, 1 or 2")
+            raise InputError(f"integrators is {shown(self.integrators)}; expected 0, 1 or 2")
         _positive_rates(real_zeros=self.real_zeros, real_poles=self.real_poles)
         if self.relative_degree < 0:
             zeros = 2 * len(self.zero_modes) + len(self.real_zeros)

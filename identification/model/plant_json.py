@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import Any
 
-from identification.base.errors import InputError
+from identification.base.errors import InputError, shown
 from identification.base.json_object import number, numbers
 from identification.model.plant import AdditiveBound, Mode, PlantModel
 
@@ -104,7 +104,7 @@ def _pairs(content: Mapping[str, Any], key: str) -> list[tuple[float, float]]:
     """omega and zeta of each of the objects at ``key``."""
     modes = content.get(key)
     if not isinstance(modes, list) or not all(isinstance(mode, Mapping) for mode in modes):
-        raise InputError(f"'{key}' is {modes!r}; expected a list of objects with 'omega' and 'zeta'")
+        raise InputError(f"'{key}' is {shown(modes)}; expected a list of objects with 'omega' and 'zeta'")
     return [(number(mode, "omega"), number(mode, "zeta")) for mode in modes]
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from identification.base.errors import InputError
+from identification.base.files import require_readable
 from identification.sweeps.response import FrequencyResponse
 
 CURVES = ("omega", "response", "coherence", "excitation")
@@ -37,9 +38,15 @@ def read_responses(path: Path) -> list[FrequencyResponse]:
     InputError
         The file is missing or of another kind.
     """
+    require_readable(path)
     try:
+        with zipfile.ZipFile(path) as archive:
+            if any(each.compress_type != zipfile.ZIP_STORED for each in archive.infolist()):
+                raise ValueError("compressed, which is never written, and may unpack to more than the memory holds")
         with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
             content: dict[str, Any] = dict(kept)
+        if any(np.iscomplexobj(curve) and not name.startswith("response_") for name, curve in content.items()):
+            raise ValueError("complex where real numbers belong")
         return [
             FrequencyResponse(
                 content[f"omega_{i}"],
@@ -52,7 +59,15 @@ def read_responses(path: Path) -> list[FrequencyResponse]:
             )
             for i, name in enumerate(content["name"])
         ]
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except (OSError, EOFError, ValueError, KeyError, TypeError, IndexError, zipfile.BadZipFile):
+    except (
+        OSError,
+        EOFError,
+        ValueError,
+        KeyError,
+        TypeError,
+        IndexError,
+        RuntimeError,
+        MemoryError,
+        zipfile.BadZipFile,
+    ):
         raise InputError(f"{path}: not the responses that 'identification fit --responses' keeps") from None

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
+from identification.base.files import is_folder, require_readable, true_path
 from identification.formats.columns import Table
 from identification.formats.csv_file import read_csv
 from identification.formats.mat_file import read_mat
@@ -41,12 +42,12 @@ def input_files(paths: Sequence[Path | str]) -> list[Path]:
     """
     files: list[Path] = []
     for path in map(Path, paths):
-        files += _files_in(path) if path.is_dir() else [path]
+        files += _files_in(path) if is_folder(path) else [path]
     met = set()
     for file in files:
-        if file.resolve() in met:
+        if (goal := true_path(file)) in met:
             raise InputError(f"{file}: is given twice; expected each file once")
-        met.add(file.resolve())
+        met.add(goal)
     return files
 
 
@@ -71,6 +72,7 @@ def read_sweeps(paths: Path | str | Sequence[Path | str]) -> list[FrequencyRespo
     files = input_files([paths] if isinstance(paths, Path | str) else paths)
     tests = []
     for file, name in zip(files, _names(files), strict=True):
+        require_readable(file)
         if file.suffix.lower() == KEPT:
             tests += read_responses(file)
             continue
@@ -88,7 +90,7 @@ def _files_in(folder: Path) -> list[Path]:
     files = [
         entry
         for entry in entries
-        if entry.suffix.lower() in READERS and not entry.name.startswith(".") and not entry.is_dir()
+        if entry.suffix.lower() in READERS and not entry.name.startswith(".") and not is_folder(entry)
     ]
     if not files:
         raise InputError(f"{folder}: holds no file that ends in {', '.join(READERS)}; expected one or more")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
+from io import BytesIO
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,9 @@ from typing import Any
 import matplotlib.style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
+from identification.base.errors import printable_lines
 from identification.base.files import write_whole
 
 COLUMN_WIDTH = 3.4
@@ -98,28 +101,41 @@ def panel_letters(axes: Iterable[Axes]) -> None:
         )
 
 
-def save(figure: Figure, folder: Path, name: str, caption: str) -> None:
-    """Write the figure as PDF, SVG and PNG and its caption as text: all four files, or none.
+def rendered(figure: Figure, folder: Path, name: str, caption: str) -> dict[Path, bytes]:
+    """The figure as PDF, SVG and PNG and its caption as text, by the paths of the files that shall hold them.
+
+    Control characters, which no SVG may have, are written as Python escapes them.
 
     Parameters
     ----------
     figure
-        The figure; saving it again gives the same bytes.
-    folder
-        An existing folder.
-    name
-        File name without suffix.
+        The figure; rendered again it gives the same bytes.
+    folder, name
+        Where the files shall lie, and their name without suffix.
     caption
-        The caption, one paragraph.
+        The caption, paragraphs of printable text.
+    """
+    for text in figure.findobj(Text):
+        if (escaped := printable_lines(text.get_text())) != text.get_text():
+            text.set_text(escaped)
+    files = {folder / f"{name}.txt": f"{printable_lines(caption)}\n".encode()}
+    with styled():
+        for kind, metadata in _METADATA.items():
+            figure.savefig(written := BytesIO(), format=kind, metadata=metadata)
+            files[folder / f"{name}.{kind}"] = written.getvalue()
+    return files
+
+
+def write(files: Mapping[Path, bytes]) -> None:
+    """Write what :func:`rendered` gave: all files, or none.
 
     Raises
     ------
     InputError
-        The folder does not exist or may not be written to.
+        A folder does not exist or may not be written to.
     """
-    writers: dict[Path, Callable[[Path], object]] = {
-        folder / f"{name}.{kind}": partial(figure.savefig, metadata=metadata) for kind, metadata in _METADATA.items()
-    }
-    writers[folder / f"{name}.txt"] = lambda path: path.write_text(caption + "\n", encoding="utf-8")
-    with styled():
-        write_whole(writers)
+    write_whole({path: partial(_write_bytes, content=content) for path, content in files.items()})
+
+
+def _write_bytes(path: Path, content: bytes) -> None:
+    path.write_bytes(content)

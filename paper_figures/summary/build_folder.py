@@ -10,7 +10,7 @@ from typing import TypeVar
 import pandas as pd
 
 from design.design_file import Design, read_design
-from identification.base.files import read_text
+from identification.base.files import is_file, read_text
 from paper_figures.result_tables import read_table
 from paper_figures.summary.of_designs import FOLLOWING
 
@@ -63,8 +63,8 @@ def read_attempts(stems: Mapping[str, Path], end: str, read: Callable[[Path], Re
     found: dict[str, Result | str] = {}
     for name, stem in stems.items():
         path, refusal = (stem.with_name(stem.name + ending) for ending in (end, ".refused.txt"))
-        if path.is_file():
+        if is_file(path):
             found[name] = read(path)
-        elif refusal.is_file() and (sentence := read_text(refusal).strip()):
+        elif is_file(refusal) and (sentence := read_text(refusal).strip()):
             found[name] = sentence.rstrip(".")
     return found

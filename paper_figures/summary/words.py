@@ -83,7 +83,7 @@ def summarise(
     fit = fitted(model)
     names = [test.name for test in fit.tests]
     if names != [test.name for test in tests]:
-        raise InputError(f"the model was fitted to {', '.join(names)}; expected these sweeps")
+        raise InputError(f"the model was fitted to {', '.join(names) or 'nothing'}; expected these sweeps")
     synthetic = sum(test.synthetic for test in tests)
     made = {name: design for name, design in designs.items() if isinstance(design, Design)}
     tables = {name: table for name, table in outcomes.items() if isinstance(table, pd.DataFrame)}

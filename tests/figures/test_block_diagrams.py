@@ -132,7 +132,7 @@ def test_two_runs_write_the_same_bytes_in_every_format(tmp_path):
     runs = []
     for folder in (tmp_path / "one", tmp_path / "two"):
         folder.mkdir()
-        style.save(module.draw({}), folder, "fig_2_07", module.caption({}))
+        style.write(style.rendered(module.draw({}), folder, "fig_2_07", module.caption({})))
         runs.append({path.name: path.read_bytes() for path in folder.iterdir()})
     assert set(runs[0]) == {f"fig_2_07.{kind}" for kind in ("pdf", "svg", "png", "txt")}
     assert runs[0] == runs[1]

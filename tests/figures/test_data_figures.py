@@ -865,10 +865,28 @@ def test_missing_column_is_one_sentence_with_its_file(name, table, column, tmp_p
     assert not list(tmp_path.glob("fig_*"))
 
 
-def test_key_error_that_is_no_column_is_not_swallowed(tmp_path, monkeypatch):
+def test_key_error_that_is_no_column_is_not_called_one(tmp_path, monkeypatch):
     monkeypatch.delitem(style.LINES, "reference")
     result = drawn(tmp_path, "fig_2_14", tables_of("fig_2_14"))
-    assert isinstance(result.exception, KeyError)
+    assert "fig_2_14 cannot be drawn of delay_free, delay_free_summary in" in result.output
+    assert "'reference'" in result.output
+    assert "no column" not in result.output
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda table: table.assign(time_s="fast"), "'fast' in the column time_s; expected a number or nothing"),
+        (lambda table: table.iloc[:1], "fig_2_14 cannot be drawn of delay_free, delay_free_summary in"),
+        (lambda table: table.assign(time_s=np.nan), "cannot be drawn"),
+    ],
+)
+def test_table_that_cannot_be_drawn_is_one_sentence(tmp_path, damage, said):
+    tables = tables_of("fig_2_14")
+    result = drawn(tmp_path, "fig_2_14", tables | {"delay_free": damage(tables["delay_free"])})
+    assert (result.exit_code, result.output.count("\n")) == (2, 1)
+    assert said in result.output
+    assert not list(tmp_path.glob("fig_*"))
 
 
 def test_table_without_rows_is_refused(tmp_path):

@@ -94,7 +94,7 @@ def test_malformed_table_is_refused(folders, figure_of_table, text):
 
 def test_missing_output_folder_is_refused(folders):
     folders[1].rmdir()
-    assert_refused(run(folders, "fig_2_01"), "cannot be written")
+    assert_refused(run(folders, "fig_2_01"), "no such folder")
     assert not folders[1].exists()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import click
@@ -14,6 +15,7 @@ from antiwindup.__main__ import main as antiwindup
 from identification.base.command_line import CommandGroup
 from identification.base.errors import InputError
 from identification.base.files import write_whole
+from identification.base.path_types import OUTPUT_FILE
 
 
 @click.group(cls=CommandGroup)
@@ -31,12 +33,16 @@ def end(how: str) -> None:
         np.linalg.inv(np.zeros((2, 2)))
     if how == "overflow":
         np.exp(np.array([1e4]))
+    if how.startswith("warned"):
+        warnings.warn("odd numbers", RuntimeWarning, stacklevel=1)
+    if how == "warned and refused":
+        raise InputError("the sweep is empty; expected numbers")
     if how == "crash":
         raise RuntimeError(how)
 
 
 @group.command()
-@click.option("--output", type=click.Path(path_type=Path))
+@click.option("--output", type=OUTPUT_FILE)
 def write(output: Path) -> None:
     """Write a file."""
     write_whole({output: lambda path: path.write_text("new", encoding="utf-8")})
@@ -53,6 +59,15 @@ def write(output: Path) -> None:
 def test_a_refusal_is_one_sentence_and_status_2(how: str, sentence: str) -> None:
     result = CliRunner().invoke(group, ["end", how])
     assert (result.exit_code, result.stdout, result.stderr) == (2, "", f"Error: {sentence}\n")
+
+
+def test_a_warning_is_shown_where_there_is_no_refusal() -> None:
+    with warnings.catch_warnings(record=True) as shown:
+        warnings.simplefilter("always")
+        assert CliRunner().invoke(group, ["end", "warned and refused"]).exit_code == 2
+        assert not shown
+        assert CliRunner().invoke(group, ["end", "warned"]).exit_code == 0
+    assert [str(each.message) for each in shown] == ["odd numbers"]
 
 
 def test_a_crash_and_a_wrong_option_are_no_refusals() -> None:

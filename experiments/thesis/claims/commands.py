@@ -9,25 +9,19 @@ from pathlib import Path
 import click
 
 from experiments.tables import csv_writer
-from identification.base.errors import InputError
 from identification.base.files import read_text, write_whole
-
-PAGE = click.Path(path_type=Path, dir_okay=False)
+from identification.base.path_types import INPUT_FILE, OUTPUT_FILE, OUTPUT_FOLDER
 
 
 @click.command("claims")
-@click.option(
-    "--output", type=click.Path(path_type=Path, file_okay=False), required=True, help="Existing folder for claims.csv."
-)
-@click.option("--page", type=PAGE, help="Markdown file to write the page to.")
+@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder for claims.csv.")
+@click.option("--page", type=OUTPUT_FILE, help="Markdown file to write the page to.")
 def claims_command(output: Path, page: Path | None) -> None:
     """What the thesis claims, computed again: claims.csv, and a page to read."""
     from experiments.thesis.claims.coverage import EXCEPTIONS, RECORD, quotes_sha256, read_exceptions, read_record
     from experiments.thesis.claims.ledger import LEDGER, read_ledger, recompute
     from experiments.thesis.claims.page import claims_page
 
-    if not output.is_dir():
-        raise InputError(f"{output}: no such folder")
     ledger, record = read_ledger(), read_record()
     counted = record["ledger_sha256"] == quotes_sha256(ledger, read_exceptions())
     table = recompute(ledger)
@@ -44,8 +38,8 @@ def claims_command(output: Path, page: Path | None) -> None:
 
 
 @click.command("coverage")
-@click.argument("text", type=PAGE)
-@click.option("--record", type=PAGE, help="JSON file to keep the counts in.")
+@click.argument("text", type=INPUT_FILE)
+@click.option("--record", type=OUTPUT_FILE, help="JSON file to keep the counts in.")
 def coverage_command(text: Path, record: Path | None) -> None:
     """List the numbers in the thesis's TEXT that no claim quotes; exit status 1 if there is one, or a quote is not."""
     from experiments.thesis.claims.coverage import (
@@ -76,7 +70,7 @@ def coverage_command(text: Path, record: Path | None) -> None:
 
 
 @click.command("equations")
-@click.option("--page", type=PAGE, required=True, help="Markdown file to write the page to.")
+@click.option("--page", type=OUTPUT_FILE, required=True, help="Markdown file to write the page to.")
 def equations_command(page: Path) -> None:
     """Each equation, lemma, theorem, table and figure of the thesis with its function and its test, as a page."""
     from experiments.thesis.claims.equations_page import EQUATIONS, equations_page, read_equations

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 from bisect import bisect
 from collections.abc import Iterator
@@ -15,8 +14,8 @@ import pandas as pd
 from data.thesis import THESIS
 from experiments.tables import read_cells
 from experiments.thesis.claims.printed_number import patterns
-from identification.base.errors import InputError
-from identification.base.files import read_text
+from identification.base.errors import InputError, shown
+from identification.base.json_object import read_object
 
 EXCEPTIONS = THESIS / "exceptions.csv"
 RECORD = THESIS / "coverage.json"
@@ -49,11 +48,11 @@ def read_exceptions(path: Path = EXCEPTIONS) -> pd.DataFrame:
         if name in (LEFT, QUOTED):
             raise InputError(f"{path}, line {line}: an exception is named {name}; expected another name")
         if scope not in SCOPES:
-            raise InputError(f"{path}, line {line}: scope is {scope!r}; expected {' or '.join(SCOPES)}")
+            raise InputError(f"{path}, line {line}: scope is {shown(scope)}; expected {' or '.join(SCOPES)}")
         try:
             re.compile(pattern)
         except re.error as error:
-            raise InputError(f"{path}, line {line}: {pattern!r} is no regular expression ({error})") from None
+            raise InputError(f"{path}, line {line}: {shown(pattern)} is no regular expression ({error})") from None
     return exceptions
 
 
@@ -134,13 +133,10 @@ def read_record(path: Path = RECORD) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The file is missing, is no JSON, or is not what that function returns.
+        The file is not what that function returns, or see :func:`identification.base.json_object.read_object`.
     """
-    try:
-        content = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise InputError(f"{path}, line {error.lineno}: {error.msg}; expected JSON") from None
-    if not isinstance(content, dict) or list(content) != list(RECORDED):
+    content = read_object(path)
+    if list(content) != list(RECORDED):
         raise InputError(f"{path}: expected an object with {', '.join(RECORDED)}")
     return content
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
 
-from identification.base.errors import InputError
+from identification.base.errors import InputError, shown
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def read_number(text: str) -> PrintedNumber:
         number = Decimal("NaN")
     exponent = number.as_tuple().exponent
     if not isinstance(exponent, int):  # NaN and infinities have a letter there
-        raise InputError(f"{text!r} is not a number; expected one like 3.062e4, 1/40, pi/2 or 0..1")
+        raise InputError(f"{shown(text)} is not a number; expected one like 3.062e4, 1/40, pi/2 or 0..1")
     return PrintedNumber(float(number), float(Decimal(5).scaleb(exponent - 1)))
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from identification.base.errors import InputError
+from identification.base.errors import InputError, printable, printable_lines
 from identification.base.files import write_whole
 from paper_figures.thesis.report.content import Content
 from paper_figures.thesis.report.inputs import LEDGER
@@ -31,7 +31,12 @@ def report_html(content: Content) -> str:
         All that it says. Each of its tables is embedded once, compressed, and every link to it unpacks that.
     """
     environment = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(HERE),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=lambda value: printable_lines(value) if type(value) is str else value,  # no HTML holds what is not
     )
     environment.filters.update(packed=_packed, breakable=_breakable, size=file_size, colour=colour)
     return environment.get_template(TEMPLATE).render(
@@ -72,7 +77,7 @@ def file_size(text: str) -> str:
 
 def _breakable(name: str) -> Markup:
     """A name that a line may break in after a dot, a colon, a stroke or an underscore."""
-    return Markup("<wbr>").join(escape(part) for part in re.split(r"(?<=[.:/_])", name))
+    return Markup("<wbr>").join(escape(part) for part in re.split(r"(?<=[.:/_])", printable(name)))
 
 
 def _packed(text: str) -> str:

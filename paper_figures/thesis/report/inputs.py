@@ -14,8 +14,8 @@ import pandas as pd
 from data.thesis import THESIS
 from design.asked_model import asked_model
 from design.design_file import Design
-from identification.base.errors import InputError
-from identification.base.files import read_bytes
+from identification.base.errors import InputError, shown
+from identification.base.files import is_file, read_bytes
 from identification.base.manifest import require_as_written
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
@@ -131,9 +131,9 @@ def read_inputs(
     files += dict.fromkeys([*(test.path for test in tests if test.path), *input_files(sweeps)])
     hashes += [(path.name, sha256(read_bytes(path)).hexdigest()) for path in files if path.suffix != KEPT]
     for source in SOURCES:
-        if (path := THESIS.parent.parent / source).is_file():
+        if is_file(path := THESIS.parent.parent / source):
             read(path, source)
-    if Path(model).is_file():
+    if is_file(Path(model)):
         read(Path(model), Path(model).name)
     for name in FOLLOWING:
         path = build / f"design_{name}.json"
@@ -145,7 +145,7 @@ def read_inputs(
     pictures = {name: _picture(build, name, tables, designs, outcomes) for name, tables in figures.items()}
     paths = {table: build / "results" / f"{table}.csv" for tables in figures.values() for table in tables}
     held = {
-        name: tuple(table for table in tables if isinstance(pictures[name], Picture) or paths[table].is_file())
+        name: tuple(table for table in tables if isinstance(pictures[name], Picture) or is_file(paths[table]))
         for name, tables in figures.items()
     }
     wanted = dict.fromkeys(table for tables in held.values() for table in tables)
@@ -195,7 +195,7 @@ def _picture(
 ) -> Picture | str:
     """A drawn figure, or the sentence that refused what it would show."""
     svg, caption = (build / "figures" / f"{name}.{kind}" for kind in ("svg", "txt"))
-    if svg.is_file() and caption.is_file():
+    if is_file(svg) and is_file(caption):
         picture = read_bytes(svg)
         if b"<svg" not in picture:
             raise InputError(f"{svg}: no SVG picture; expected what 'python -m paper_figures draw {name}' writes")
@@ -205,7 +205,7 @@ def _picture(
         for outcome in (outcomes.get(experiment), *needed):
             if isinstance(outcome, str):
                 return outcome
-    missing = caption if svg.is_file() else svg
+    missing = caption if is_file(svg) else svg
     raise InputError(f"{missing}: no such file; expected what 'python -m paper_figures draw {name}' writes")
 
 
@@ -224,7 +224,7 @@ def _ledger(text: str, path: Path) -> pd.DataFrame:
     for column in ("computed", "tolerance"):
         cells = ledger[column][ledger[column] != ""]
         if (words := cells[pd.to_numeric(cells, errors="coerce").isna()]).any():
-            raise InputError(f"{path}: {words.iloc[0]!r} in the column {column}; expected a number or nothing")
+            raise InputError(f"{path}: {shown(words.iloc[0])} in the column {column}; expected a number or nothing")
     if (again := ledger["id"][ledger["id"].duplicated()]).any():
         raise InputError(f"{path}: the id {again.iloc[0]} stands in several rows; expected each once")
     return ledger
