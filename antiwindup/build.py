@@ -21,7 +21,7 @@ from identification.base.files import partial_file, write_whole
 from identification.base.folder_lock import locked_folder
 from identification.base.manifest import read_manifest
 
-REFUSED = "Error: "
+REFUSED, USAGE = "Error: ", "Usage: "
 
 Tell = Callable[[int, Sequence[str]], object]
 """Called with the number of steps that have ended and the names of those that run."""
@@ -140,9 +140,12 @@ class Build:
             return True
         self._made.append(step)
         folder.begin(source, step.outputs)
+        for path in step.outputs:
+            if self.force and not path.is_dir():  # which the command refuses
+                path.unlink(missing_ok=True)
         closing = ExitStack()
         log = closing.enter_context(partial_file(self.path, ".log"))
-        process = start(step.command, log, self.force)
+        process = start(step.command, log)
         self._running[process.sentinel] = _Running(step, source, process, log, closing)
         return False
 
@@ -157,8 +160,13 @@ class Build:
             folder.remove([step.refusal])
             self.printed[step.name] = said
             return step
-        before, refused, sentence = said.strip().rpartition(REFUSED)
-        is_refusal = ended.process.exitcode == 2 and refused and not before
+        *before, sentence = said.strip().splitlines() or [""]
+        is_refusal = (
+            ended.process.exitcode == 2
+            and sentence.startswith(REFUSED)
+            and not any(line.startswith(USAGE) for line in before)
+        )
+        sentence = sentence.removeprefix(REFUSED)
         if not is_refusal or step is self.steps[0] or not self.goes_on:
             self._remove(self._after([step]))
             if is_refusal:

@@ -154,7 +154,7 @@ def _experiments(asked: Asked) -> list[Step]:
     delay_free, extended, robust = (folder / f"design_{name}.json" for name in ("delay_free", "extended", "robust"))
     limit = () if asked.limit is None else ("--limit", str(asked.limit))
     campaign = folder / "results" / "campaign.parquet"
-    plants = ("--plants", str(asked.plants), "--seed", "1", *limit, "--output", str(campaign))
+    plants = ("--plants", str(asked.plants), "--seed", "1", *limit, "--anew", "--output", str(campaign))
     return [
         Step(
             "additive-error",

@@ -7,12 +7,10 @@ import os
 import sys
 import threading
 from collections.abc import Sequence
-from contextlib import nullcontext
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from identification.base.files import write_protected_too
-from identification.base.process import begin, begins_children, leave_signals_to_parent
+from identification.base.process import begin, leave_signals_to_parent, undisturbed
 
 PACKAGES = [
     "flint",
@@ -30,7 +28,7 @@ PACKAGES = [
 """What takes long to import."""
 
 
-def start(command: Sequence[str], log: Path, force: bool) -> BaseProcess:
+def start(command: Sequence[str], log: Path) -> BaseProcess:
     """Start ``antiwindup COMMAND...``; what it prints goes to a file. When this process ends, so does that one.
 
     Parameters
@@ -39,20 +37,18 @@ def start(command: Sequence[str], log: Path, force: bool) -> BaseProcess:
         The room and what stands after it on a command line; no shell reads it.
     log
         An existing file.
-    force
-        Whether write-protected outputs are replaced.
     """
     has_server = "forkserver" in multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("forkserver") if has_server else multiprocessing.get_context("spawn")
     os.environ["PYTHONSAFEPATH"] = "1"  # the processes import nothing from the folder that they happen to run in
     context.set_forkserver_preload(PACKAGES)
-    process: BaseProcess = context.Process(target=_run, args=(tuple(command), str(log), force))
-    with begins_children:
+    process: BaseProcess = context.Process(target=_run, args=(tuple(command), str(log)))
+    with undisturbed:
         process.start()
     return process
 
 
-def _run(command: Sequence[str], log: str, force: bool) -> None:
+def _run(command: Sequence[str], log: str) -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
     threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
@@ -65,8 +61,7 @@ def _run(command: Sequence[str], log: str, force: bool) -> None:
     from antiwindup.__main__ import main
 
     sys.argv = ["antiwindup", *command]
-    with write_protected_too() if force else nullcontext():
-        main(list(command), prog_name="antiwindup")
+    main(list(command), prog_name="antiwindup")
 
 
 def _end_after(parent: BaseProcess) -> None:

@@ -103,7 +103,9 @@ def interrupted(command: str, given: Mapping[str, str], name: str, after_s: floa
         printed, said = process.communicate(timeout=60)
         seconds = time.monotonic() - sent
         if was_done or process.returncode in (0, 2):  # or as it was sent
-            return End([], 0.0, True)
+            return End(
+                [] if process.returncode in (0, 2) else [f"status {process.returncode}, said {said!r}"], 0.0, True
+            )
         lines = [line for line in said.splitlines() if line.startswith("Interrupted; ")]
         wrong = [f"status {process.returncode}"] if process.returncode != SIGNALS[name] else []
         wrong += [f"said {said!r}"] if len(lines) != 1 or "Traceback" in said else []
@@ -161,7 +163,7 @@ def main(times: int, seed: int, longest: float) -> None:
             for name in SIGNALS:
                 ends = [interrupted(command, given, name, chance.uniform(0, longest)) for _ in range(times)]
                 wrong = [end.wrong for end in ends if end.wrong]
-                done = sum(end.was_done for end in ends)
+                done = sum(end.was_done and not end.wrong for end in ends)
                 slowest = max(end.seconds for end in ends)
                 right = times - done - len(wrong)
                 click.echo(f"{command:14s}{name:9s}{right:6d}{len(wrong):6d}{slowest:11.3f}{done:13d}")

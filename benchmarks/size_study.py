@@ -43,7 +43,7 @@ def made_up(campaign, chunks):
 run_campaign.run_here = made_up
 file, reference = folder / "design.json", sinusoid(amplitude=50.0, omega=1.5)
 output = folder / "campaign.parquet"
-run_campaign.run_campaign(read_design(file), file, plants, 1, reference, 12.0, 5, None, output)
+run_campaign.run_campaign(read_design(file), file, plants, 1, reference, 12.0, 5, None, output, False)
 """
 
 

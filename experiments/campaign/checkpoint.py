@@ -18,7 +18,7 @@ import click
 from experiments.campaign.run_plants import CHUNK, Campaign, Columns
 from experiments.campaign.seal import SEAL, Seal
 from identification.base.errors import InputError
-from identification.base.files import read_bytes, read_text, write_whole
+from identification.base.files import read_bytes, read_text, require_replaceable, write_whole
 
 MANIFEST = "manifest.json"
 PARTIAL = ".partial-"  # of a command that was killed while it wrote
@@ -43,6 +43,8 @@ class CampaignFile:
         How many.
     source
         The file of the design, which is not written over.
+    anew
+        Whether the parts of another campaign are removed; no other file of their folder is.
 
     Raises
     ------
@@ -56,7 +58,7 @@ class CampaignFile:
     manifest and of the part's content together, so that what is read is whole and of this campaign, or is run again.
     """
 
-    def __init__(self, output: Path, campaign: Campaign, plants: int, source: Path) -> None:
+    def __init__(self, output: Path, campaign: Campaign, plants: int, source: Path, anew: bool = False) -> None:
         self.output, self.folder = output, output.with_name(f"{output.name}.parts")
         self._plants = plants
         self._facts = {
@@ -79,12 +81,11 @@ class CampaignFile:
         }
         if os.path.realpath(output) == os.path.realpath(source):
             raise InputError(f"{output}: is an input too; expected another file to write")
-        if output.exists() and not output.is_file():
-            raise InputError(f"{output}: cannot be written; expected a file, found something else")
+        require_replaceable(output)
         self._parts: dict[int, Path] = {}
         if self.folder.exists():
-            self._require_the_same()
-            self._find_parts()
+            self._claim_folder(anew)
+            self._parts = self._parts_of(self._manifest)
 
     @property
     def missing(self) -> list[tuple[int, int]]:
@@ -101,7 +102,7 @@ class CampaignFile:
         buffer = BytesIO()
         parquet.write_table(_table(columns), buffer)
         content, number = buffer.getvalue(), chunk[0] // CHUNK
-        part = self.folder / self._name(number, content)
+        part = self.folder / _name(number, self._manifest, content)
         write_whole({part: lambda partial: partial.write_bytes(content)})
         self._parts[number] = part
 
@@ -138,19 +139,19 @@ class CampaignFile:
 
         path = self._parts[number]
         content = read_bytes(path)
-        if path.name != self._name(number, content):
+        if path.name != _name(number, self._manifest, content):
             raise InputError(f"{path}: has been changed meanwhile; give the same command to run this part again")
         return parquet.read_table(BytesIO(content))
 
-    def _name(self, number: int, content: bytes) -> str:
-        return f"part-{number:06d}-{sha256(self._manifest.encode() + content).hexdigest()}.parquet"
-
-    def _find_parts(self) -> None:
+    def _parts_of(self, manifest: str) -> dict[int, Path]:
+        """The whole parts of the campaign with a manifest, by their numbers."""
+        parts = {}
         for path in self.folder.iterdir():
             found = PART.fullmatch(path.name)
             with suppress(OSError):  # what cannot be read is run again
-                if found and path.name == self._name(int(found[1]), path.read_bytes()):
-                    self._parts[int(found[1])] = path
+                if found and path.name == _name(int(found[1]), manifest, path.read_bytes()):
+                    parts[int(found[1])] = path
+        return parts
 
     def _begin(self) -> None:
         try:
@@ -159,24 +160,37 @@ class CampaignFile:
             raise InputError(f"{self.folder}: cannot be made ({error.strerror})") from None
         write_whole({self.folder / MANIFEST: lambda partial: partial.write_text(self._manifest, encoding="utf-8")})
 
-    def _require_the_same(self) -> None:
+    def _claim_folder(self, anew: bool) -> None:
         if not (self.folder.is_dir() and os.access(self.folder, os.W_OK | os.X_OK)):
             raise InputError(f"{self.folder}: cannot be written; expected a folder that may be written to, or none")
         if all(path.name.startswith(PARTIAL) for path in self.folder.iterdir()):
-            return
+            return None
         try:
-            found = json.loads(read_text(self.folder / MANIFEST))
+            found = json.loads(text := read_text(self.folder / MANIFEST))
         except ValueError:
             found = None
         if not isinstance(found, dict):
             raise InputError(f"{self.folder}: is not the folder of a campaign; expected none, or one to go on with")
         for name, value in self._facts.items():
+            if found.get(name) != value and anew:
+                return self._remove_parts(text)
             if found.get(name) != value:
                 there, here = _said(found.get(name), value), _said(value, found.get(name))
                 raise InputError(
                     f"{self.folder}: holds the parts of another campaign, {name} {there} and not {here}; "
-                    "give the same command to go on with it, or remove the folder"
+                    "give the same command to go on with it, or --anew to remove them"
                 )
+        return None
+
+    def _remove_parts(self, manifest: str) -> None:
+        for path in self._parts_of(manifest).values():
+            path.unlink(missing_ok=True)
+        (self.folder / MANIFEST).unlink(missing_ok=True)
+
+
+def _name(number: int, manifest: str, content: bytes) -> str:
+    """The name of a part, by which it is known to be whole and of its campaign."""
+    return f"part-{number:06d}-{sha256(manifest.encode() + content).hexdigest()}.parquet"
 
 
 def _said(value: Any, other: Any) -> str:

@@ -22,6 +22,7 @@ plant_options = together(
     ),
     click.option("--scheduler", metavar="ADDRESS", help="Run on the Dask cluster with this scheduler, not here."),
     click.option("--output", type=OUTPUT_FILE, required=True, help="Parquet file to write."),
+    click.option("--anew", is_flag=True, help="Remove what another campaign that was interrupted has kept there."),
 )
 """Which plants a campaign has, and where it runs."""
 
@@ -37,6 +38,7 @@ def campaign_command(
     seed: int,
     scheduler: str | None,
     output: Path,
+    anew: bool,
     limit: float,
     periods: int,
     **reference: Any,
@@ -53,4 +55,5 @@ def campaign_command(
     if not 1 <= periods <= MOST_PERIODS:
         raise InputError(f"--periods is {periods}; expected 1 to {MOST_PERIODS}")
     content = read_design(design)
-    run_campaign(content, design, plants, seed, sinusoids(content, **reference), limit, periods, scheduler, output)
+    asked = sinusoids(content, **reference)
+    run_campaign(content, design, plants, seed, asked, limit, periods, scheduler, output, anew)

@@ -17,6 +17,7 @@ from experiments.campaign.run_plants import Campaign, code_sha256
 from experiments.campaign.workers import run_here, run_on_cluster
 from experiments.runs.guarantee import sector_text
 from experiments.runs.references import Reference
+from identification.base import process
 from identification.base.errors import InputError
 from identification.base.files import read_bytes
 from identification.base.folder_lock import locked_file
@@ -34,6 +35,7 @@ def run_campaign(
     periods: int,
     scheduler: str | None,
     output: Path,
+    anew: bool,
 ) -> None:
     """Run a campaign, keep it, and say what came out.
 
@@ -47,8 +49,8 @@ def run_campaign(
         Of every run, see :class:`experiments.campaign.run_plants.Campaign`.
     scheduler
         Address of a Dask cluster's; None runs the campaign here.
-    output
-        The parquet file.
+    output, anew
+        The parquet file, and whether the parts of another campaign beside it are removed.
 
     Raises
     ------
@@ -62,7 +64,7 @@ def run_campaign(
     digest = hashlib.sha256(read_bytes(design)).hexdigest()
     campaign = Campaign(content, digest, seed, reference, limit, periods, code_sha256())
     with locked_file(output):
-        _complete(CampaignFile(output, campaign, plants, design), campaign, plants, scheduler)
+        _complete(CampaignFile(output, campaign, plants, design, anew), campaign, plants, scheduler)
     summary = campaign_tables(output)["campaign_summary"]
     click.echo(_promised(summary))
     click.echo(f"{plants} plants within W_a -> {output}; limits +-{limit:.6g}, {campaign.horizon_s:.6g} s each")
@@ -86,13 +88,12 @@ def _complete(file: CampaignFile, campaign: Campaign, plants: int, scheduler: st
                     file.keep(chunk, columns)
                     left -= chunk[1] - chunk[0]
                     bar.update(chunk[1] - chunk[0])
-        except KeyboardInterrupt:
-            kept = f"{plants - left} of {plants} plants are kept in {file.folder}"
-            click.echo(f"{kept}; the same command goes on", err=True)
-            raise
+                    kept = f"{plants - left} of {plants} plants are kept in {file.folder}"
+                    process.leaves(f"{kept}; the same command goes on")
         finally:
             done.close()
     file.finish()
+    process.leaves(process.NOTHING_LOST)
 
 
 def _promised(summary: pd.DataFrame) -> str:

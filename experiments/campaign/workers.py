@@ -47,7 +47,7 @@ def run_here(campaign: Campaign, chunks: Sequence[Chunk]) -> Done:
         try:
             while True:
                 for chunk in waiting:
-                    with process.begins_children:
+                    with process.undisturbed:
                         future = pool.submit(run_chunk, campaign, *chunk)
                     running[future] = chunk
                     if len(running) >= AHEAD * cores:

@@ -6,6 +6,8 @@ first thread, which signals are for, a compiled loop would end in a crash of the
 
 from __future__ import annotations
 
+import os
+import signal
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -17,6 +19,10 @@ import numpy as np
 
 STOP, REACHED = 0, 1  # of a watch: whether to stop, and how far the loop is
 EVERY_S = 0.1  # how often a waiting thread looks
+
+_idle: list[ThreadPoolExecutor] = []  # a new thread would have all its memory to fetch, which takes 5 % of a run
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_idle.clear)  # a thread is not forked with its process
 
 Result = TypeVar("Result")
 Tick = Callable[[float], object]
@@ -42,11 +48,12 @@ def watched(loop: Callable[[np.ndarray], Result], tick: Tick | None = None) -> R
         Called some times a second, in this thread, with what REACHED has grown by.
     """
     state = watch()
-    if tick is None and threading.current_thread() is not threading.main_thread():
+    is_first = threading.current_thread() is threading.main_thread()
+    if tick is None and not (is_first and signal.getsignal(signal.SIGINT) != signal.SIG_IGN):
         return loop(state)
-    told, pool = 0.0, ThreadPoolExecutor(1)
+    told, pool = 0.0, _idle.pop() if _idle else ThreadPoolExecutor(1)
+    running = pool.submit(copy_context().run, loop, state)  # with what numpy raises here
     try:
-        running = pool.submit(copy_context().run, loop, state)  # with what numpy raises here
         while not wait_for([running], EVERY_S).done:
             if tick is not None and state[REACHED] > told:
                 tick(state[REACHED] - told)
@@ -54,4 +61,7 @@ def watched(loop: Callable[[np.ndarray], Result], tick: Tick | None = None) -> R
         return running.result()
     finally:
         state[STOP] = 1.0
-        pool.shutdown(wait=False)
+        if running.done():
+            _idle.append(pool)
+        else:
+            pool.shutdown(wait=False)

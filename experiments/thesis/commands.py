@@ -159,7 +159,9 @@ def sampled_rates(design: Path, limit: float | None, output: Path) -> None:
 @thesis.command("campaign")
 @plant_options
 @LIMIT
-def campaign(design: Path, plants: int, seed: int, scheduler: str | None, output: Path, limit: float | None) -> None:
+def campaign(
+    design: Path, plants: int, seed: int, scheduler: str | None, output: Path, anew: bool, limit: float | None
+) -> None:
     """Run DESIGN with plants drawn inside W_a, as the command campaign does."""
     from design.design_file import read_design
     from experiments.campaign.run_campaign import run_campaign
@@ -170,7 +172,7 @@ def campaign(design: Path, plants: int, seed: int, scheduler: str | None, output
     given = positive_limit(limit)
     limit = usual_limit(content) if given is None else given
     reference = thesis_reference(content.kind, content.reference_omegas)
-    run_campaign(content, design, plants, seed, reference, limit, usual_periods(content), scheduler, output)
+    run_campaign(content, design, plants, seed, reference, limit, usual_periods(content), scheduler, output, anew)
 
 
 @thesis.command("additive-error")

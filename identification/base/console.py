@@ -58,7 +58,8 @@ def _show_that_it_works(thread: Thread) -> None:
         return
     from tqdm import tqdm
 
-    with tqdm(desc="at work", bar_format="{desc}: {elapsed}", leave=False, delay=1e9) as bar:
+    with tqdm(desc="at work", bar_format="{desc}: {elapsed}", leave=False, delay=1e-9) as bar:  # not shown yet
+        bar.start_t -= PATIENCE_S
         while thread.is_alive():
             (bar.refresh if list(tqdm._instances) == [bar] else bar.clear)()  # type: ignore[attr-defined]
             thread.join(EVERY_S)

@@ -16,6 +16,7 @@ from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 
 from identification.base.errors import InputError, MissingFile
+from identification.base.process import undisturbed
 
 _HOST = sha256(socket.gethostname().encode()).hexdigest()[:8]
 _PARTIAL = re.compile(rf"\.partial-{_HOST}-(\d+)-\d+(\..*)?")
@@ -190,8 +191,10 @@ def partial_file(folder: Path, suffix: str) -> Iterator[Path]:
         No file can be made in the folder.
     """
     path = folder / f".partial-{_HOST}-{os.getpid()}-{next(_numbers)}{suffix}"
-    with removed_at_the_end(path):
-        path.touch(0o600, exist_ok=False)
+    with ExitStack() as stack:
+        with undisturbed:
+            stack.enter_context(removed_at_the_end(path))
+            path.touch(0o600, exist_ok=False)
         yield path
 
 
@@ -226,8 +229,9 @@ def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterab
                 with partials[target].open("rb+") as whole:  # a power cut must not leave a name without its contents
                     os.fsync(whole.fileno())
                 partials[target].chmod(0o666 & ~_umask())
-            for target, partial in partials.items():
-                partial.replace(goals[target])
+            with undisturbed:
+                for target, partial in partials.items():
+                    partial.replace(goals[target])
     except OSError as error:
         raise InputError(f"{target}: cannot be written ({error.strerror or error})") from None
 

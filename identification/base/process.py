@@ -24,7 +24,7 @@ KILLED = 128  # a status is that and the signal's number, as a shell gives it
 LONGEST_END_S = 0.1  # that a process has to end the processes that it began
 NOTHING_LOST = "no file is half written"
 
-begins_children = threading.Lock()  # held while a process begins: until it is listed it cannot be ended
+undisturbed = threading.Lock()  # held while a process or a file begins, until it is listed, and while files get names
 _left = NOTHING_LOST
 
 
@@ -57,7 +57,7 @@ def end(number: int, _frame: object = None) -> None:
     try:
         for each in SIGNALS:
             signal.signal(each, signal.SIG_IGN)
-        begins_children.acquire(timeout=0.1)
+        undisturbed.acquire(timeout=0.1)
         _end_children()
         _loaded("identification.base.files", "remove_partials", list)()
     finally:
@@ -78,6 +78,9 @@ def _end_children() -> None:
     for child in children:
         child.join(max(until - time.monotonic(), 0.0))
         child.kill()
+    server = getattr(sys.modules.get("multiprocessing.forkserver"), "_forkserver", None)  # told of nowhere
+    if (number := getattr(server, "_forkserver_pid", None)) is not None:
+        os.kill(number, signal.SIGKILL)
 
 
 def _loaded(module: str, function: str, otherwise: Callable[[], Any]) -> Callable[[], Any]:

@@ -92,7 +92,7 @@ def test_the_wheel_works_from_any_folder(tree: Path, tmp_path: Path) -> None:
 
 
 def test_the_help_imports_no_room() -> None:
-    code = "import sys, antiwindup.__main__ as it; it.main(['--help'], standalone_mode=False); print(*sys.modules)"
+    code = "import sys, antiwindup.__main__ as it; it.main.main(['--help'], standalone_mode=False); print(*sys.modules)"
     done = run(sys.executable, "-c", code, cwd=ROOT)
     assert all(f"\n  {room}" in done.stdout for room in ROOMS[:4])
     assert not {"scipy", "design.__main__"} & set(done.stdout.splitlines()[-1].split())

@@ -75,7 +75,7 @@ def refit(
     """Build ``tmp_path / "mine"`` from the sweep a.csv, or from others."""
     steps: list[Step] = []
 
-    def start(command: Sequence[str], log: Path, force: bool) -> StandIn:
+    def start(command: Sequence[str], log: Path) -> StandIn:
         (step,) = [step for step in steps if step.command == command]
         return StandIn(step, log, behaviour.get(step.name, ""))
 
@@ -269,6 +269,8 @@ def test_a_write_protected_output_is_refused_before_anything_is_done(refit: Refi
     with pytest.raises(InputError, match=r"summary\.txt: is write-protected"):
         refit()
     assert built(tmp_path) == before
+    refit(force=True)
+    assert built(tmp_path)["summary.txt"] != before["summary.txt"]
 
 
 def test_two_builds_of_one_folder(refit: Refit, tmp_path: Path) -> None:

@@ -165,3 +165,18 @@ def test_a_folder_that_cannot_hold_parts_is_refused_before_anything_runs(
         assert result.exit_code == 2
         assert sentence in result.stderr
         assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_the_parts_of_another_campaign_go_on_request_and_nothing_else_does(
+    campaign: Campaign, design: Path, tmp_path: Path
+) -> None:
+    other = kept(tmp_path / "c.parquet", replace(campaign, seed=2), design)
+    whole, damaged, notes = *sorted(other.folder.glob("part-*"))[:2], other.folder / "notes.md"
+    damaged.write_bytes(b"another's")
+    notes.write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match=r"another campaign, seed 2 and not 1; .* or --anew to remove them"):
+        CampaignFile(other.output, campaign, PLANTS, design)
+    assert whole.exists()
+    CampaignFile(other.output, campaign, PLANTS, design, anew=True)
+    assert {path.name for path in other.folder.iterdir()} == {damaged.name, notes.name}
+    assert notes.read_text(encoding="utf-8") == "mine"

@@ -92,7 +92,7 @@ def test_ctrl_c_stops_a_run(extended_design: Design) -> None:
     assert time.monotonic() - at < PATIENCE_S
     while threading.active_count() > before and time.monotonic() - at < PATIENCE_S:
         time.sleep(0.01)
-    assert threading.active_count() == before
+    assert threading.active_count() <= before
 
 
 @pytest.mark.usefixtures("answering")

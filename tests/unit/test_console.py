@@ -1,0 +1,219 @@
+"""What a command shows and where: progress on terminals only, one sentence, and no traceback where nothing is heard."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import subprocess
+import sys
+import termios
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from design.design_file import Design
+from identification.base.command_line import CommandGroup
+from identification.base.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[2]
+SWEEPS = [f"data/elevation/synthetic_test_{k}_frf.csv" for k in (1, 2)]
+
+
+@pytest.fixture
+def design_json(extended_design: Design, tmp_path: Path) -> Path:
+    path = tmp_path / "design.json"
+    path.write_text(extended_design.to_json(), encoding="utf-8")
+    return path
+
+
+def on_terminal(words: Sequence[str], **environment: str) -> str:
+    """What a program that ends well writes to a terminal, which is its standard input, output and error."""
+    mine, its = pty.openpty()
+    termios.tcsetwinsize(its, (24, 80))
+    process = subprocess.Popen(
+        [sys.executable, *words], cwd=ROOT, env=os.environ | environment, stdin=its, stdout=its, stderr=its
+    )
+    os.close(its)
+    shown = b""
+    try:
+        while part := os.read(mine, 65536):
+            shown += part
+    except OSError:  # Linux's way to say that the other side is closed
+        pass
+    os.close(mine)
+    assert process.wait() == 0, shown
+    return shown.decode()
+
+
+def to_pipes(words: Sequence[str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, *words], cwd=ROOT, capture_output=True, text=True, check=True)
+
+
+RUN = ["--limit", "9", "--anti-windup", "thesis", "--amplitude", "50"]
+PROGRESS = {
+    "fits: ": ["identification", "fit", *SWEEPS, "--output", "{folder}/model.json"],
+    "simulate: ": [
+        *["experiments", "simulate", "{design}", *RUN, "--until", "300", "--sample-time", "1"],
+        *["--output", "{folder}/run.csv"],
+    ],
+    "sampled: ": [
+        *["experiments", "sampled", "{design}", *RUN, "--until", "5", "--rate", "10000", "--method", "tustin"],
+        *["--output", "{folder}/run.csv"],
+    ],
+}
+
+
+@pytest.mark.parametrize("bar", PROGRESS)
+def test_progress_is_shown_on_a_terminal_and_nowhere_else(bar: str, design_json: Path, tmp_path: Path) -> None:
+    words = ["-m", *(word.format(design=design_json, folder=tmp_path) for word in PROGRESS[bar])]
+    shown, piped = on_terminal(words), to_pipes(words)
+    assert bar in shown
+    assert bar not in shown.rpartition("\r")[2]  # it goes when the command is done
+    assert shown.endswith(piped.stdout.replace("\n", "\r\n"))
+    assert piped.stderr == ""
+
+
+SLOW = (
+    "import click, sys, time; from tqdm import tqdm; from identification.base.command_line import CommandGroup\n"
+    "@click.group(cls=CommandGroup)\n"
+    "def main(): pass\n"
+    "@main.command()\n"
+    "@click.option('--bar', is_flag=True)\n"
+    "def slow(bar):\n"
+    "    click.echo('begins\\x07')\n"
+    "    with tqdm(desc='counted', disable=None if bar else True, leave=False): time.sleep(2.8)\n"
+    "    click.echo('ends')\n"
+    "main(['slow', *sys.argv[1:]])\n"
+)
+
+
+def test_a_command_without_a_bar_of_its_own_shows_the_time_it_takes() -> None:
+    """Every command, since all are of one class."""
+    shown = on_terminal(["-c", SLOW])
+    assert "at work: 00:02" in shown
+    assert re.search(r"\r +\rbegins\\x07\r\nends\r\n$", shown)
+    assert "at work" not in on_terminal(["-c", SLOW, "--bar"])
+    assert to_pipes(["-c", SLOW]).stderr == ""
+
+
+def test_compilation_is_said_on_a_terminal(tmp_path: Path) -> None:
+    code = "import numpy as np; from experiments.engine import crossings as c; c._sign_changes(np.ones(2))"
+    shown = on_terminal(["-c", code], XDG_CACHE_HOME=str(tmp_path))
+    assert shown == "Compiling, once for this machine: some 20 s.\r\n"
+    assert on_terminal(["-c", code], XDG_CACHE_HOME=str(tmp_path)) == ""
+
+
+ROOMS = ("identification", "design", "experiments", "paper_figures", "antiwindup")
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_nobody_hears_a_command(room: str) -> None:
+    """A full device gets a sentence, a reader that left gets none; a refusal keeps its status."""
+
+    def ended(command: str) -> tuple[int, str]:
+        words = ["/bin/bash", "-o", "pipefail", "-c", command, sys.executable]
+        done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+        return done.returncode, done.stderr
+
+    helped, refused = f"$0 -m {room} --help", f"$0 -m {room} nothing"
+    full = (1, "Error: standard output cannot be written to (No space left on device)\n")
+    for command, expected in {
+        f"{helped} > /dev/full": full,
+        f"{helped} > /dev/full 2> /dev/full": (1, ""),
+        f"{helped} >&-": (0, ""),
+        f"{helped} >&- 2>&- <&-": (0, ""),
+        f"{refused} 2>&-": (2, ""),
+        f"{refused} 2> /dev/full": (2, ""),
+        f"({helped}; echo $? >&2) | true": (0, "141\n"),
+    }.items():
+        assert ended(command) == expected, command
+
+
+NOISE = (
+    "import click, warnings; from identification.base.process import begin; begin()\n"
+    "from identification.base.command_line import CommandGroup; import numpy as np\n"
+    "@click.group(cls=CommandGroup)\n"
+    "def main(): pass\n"
+    "@main.command()\n"
+    "def noise():\n"
+    "    warnings.warn('a warning'); np.sqrt(-np.ones(1))\n"
+    "    np.linalg.lstsq(np.full((3, 2), np.nan), np.ones(3), rcond=None)\n"
+    "main(['noise'])\n"
+)
+
+
+def test_libraries_write_nothing_beside_a_refusal() -> None:
+    """LAPACK writes to standard output past Python."""
+    done = subprocess.run([sys.executable, "-c", NOISE], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert re.fullmatch(r"Error: the numbers given are too extreme to compute with \(.*\)\n", done.stderr)
+
+
+@click.group(cls=CommandGroup)
+def group() -> None:
+    pass
+
+
+@group.command()
+@click.option("--number", type=float)
+@click.argument("kind")
+def ends(kind: str, number: float | None) -> None:
+    """Raise what is asked for."""
+    errors = {
+        "escape": InputError("a.csv, line 2: \x1b[31mred\x07 is no number\x9b2J"),
+        "long": InputError(f"a.csv's test is '{'x' * 1000}'; expected what the loop's test, named elsewhere, is"),
+        "memory": MemoryError("Unable to allocate 7.45 GiB for an array"),
+        "bare": MemoryError(),
+    }
+    raise errors[kind]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["escape"], r"Error: a.csv, line 2: \x1b[31mred\x07 is no number\x9b2J"),
+        (["long"], f"Error: a.csv's test is '{'x' * 80}...'; expected what the loop's test, named elsewhere, is"),
+        (
+            ["memory"],
+            "Error: out of memory (unable to allocate 7.45 GiB for an array); expected less input, or a machine with "
+            "more memory",
+        ),
+        (["bare"], "Error: out of memory; expected less input, or a machine with more memory"),
+        (["escape", "--number", "\x1b[2J"], r"Error: Invalid value for '--number': '\x1b[2J' is not a valid float."),
+        (["escape", "--\x1b[2J"], r"Error: No such option '--\x1b[2J'."),
+    ],
+)
+def test_sentences_are_fit_for_a_terminal(words: list[str], said: str) -> None:
+    result = CliRunner().invoke(group, ["ends", *words])
+    assert (result.exit_code, result.stderr.splitlines()[-1]) == (2, said)
+
+
+def test_a_fit_hangs_on_no_number_of_threads(tmp_path: Path) -> None:
+    fitted = []
+    for threads in ("1", "2"):
+        words = ["-m", "identification", "fit", *SWEEPS, "--output", str(tmp_path / f"{threads}.json")]
+        environment = os.environ | {"OPENBLAS_NUM_THREADS": threads, "OMP_NUM_THREADS": threads}
+        subprocess.run([sys.executable, *words], cwd=ROOT, env=environment, capture_output=True, check=True)
+        fitted.append((tmp_path / f"{threads}.json").read_bytes())
+    assert fitted[0] == fitted[1]
+
+
+def test_caches_go_where_they_can_be_written(tmp_path: Path) -> None:
+    """As in a container; a file in the folder's place bars root too."""
+    (barred := tmp_path / "home").touch()
+    (temporary := tmp_path / "tmp").mkdir()
+    environment = {
+        name: value for name, value in os.environ.items() if name not in ("XDG_CACHE_HOME", "XDG_CONFIG_HOME")
+    } | {"HOME": str(barred), "TMPDIR": str(temporary)}
+    words = [sys.executable, "-m", "paper_figures", "draw", "fig_2_06", "--results", ".", "--output", str(tmp_path)]
+    said = [
+        subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True, check=True).stderr
+        for _ in range(2)
+    ]
+    kept = temporary / f"antiwindup-{os.getuid()}"
+    assert said == [f"{barred}/.cache, {barred}/.config cannot be written to; caches are kept in {kept}\n", ""]
+    assert list((kept / "matplotlib").glob("fontlist-*"))
