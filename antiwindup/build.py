@@ -17,7 +17,7 @@ from antiwindup.output_folder import OutputFolder
 from antiwindup.steps import Step
 from antiwindup.worker import start
 from identification.base.errors import InputError
-from identification.base.files import partial_file, write_whole
+from identification.base.files import is_folder, partial_file, write_whole
 from identification.base.folder_lock import locked_folder
 from identification.base.manifest import read_manifest
 
@@ -141,7 +141,7 @@ class Build:
         self._made.append(step)
         folder.begin(source, step.outputs)
         for path in step.outputs:
-            if self.force and not path.is_dir():  # which the command refuses
+            if self.force and not is_folder(path):  # which the command refuses
                 path.unlink(missing_ok=True)
         closing = ExitStack()
         log = closing.enter_context(partial_file(self.path, ".log"))

@@ -8,6 +8,7 @@ from math import floor, log10
 
 from identification.base.arrays import Real
 from identification.base.digits import lower_end
+from identification.base.files import is_file, read_bytes
 from identification.fitting.first_guess import BOUNDS
 from identification.fitting.fit_plant import FitResult
 from identification.fitting.single_test_fit import OneFit
@@ -57,6 +58,7 @@ def fit_record(
 
 
 def _test_record(test: FrequencyResponse, fit: OneFit) -> FittedTest:
+    file = test.path if test.path is not None and is_file(test.path) else None  # of kept responses it may be gone
     return FittedTest(
         name=fit.name,
         lines=fit.lines,
@@ -66,7 +68,7 @@ def _test_record(test: FrequencyResponse, fit: OneFit) -> FittedTest:
         chi_square=fit.chi_square,
         residual_correlation=fit.correlation,
         median_distance=fit.distance,
-        sha256=None if test.path is None else hashlib.sha256(test.path.read_bytes()).hexdigest(),
+        sha256=None if file is None else hashlib.sha256(read_bytes(file)).hexdigest(),
         synthetic=test.synthetic,
     )
 
