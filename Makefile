@@ -15,7 +15,6 @@ ifeq ($(origin SWEEPS),undefined)
 SWEEPS := $(sort $(wildcard data/elevation/*_frf.csv))
 endif
 SETS ?= 200
-CASES ?= 200
 SEED ?= 1
 TIMES ?= 5
 
@@ -61,12 +60,15 @@ bench: $(BENCH_READY) ## measure speed as ratios against peers, and the cost of 
 	$(PY) benchmarks/closed_loop_cost.py --output build/bench
 study: $(READY) ## fit hundreds of synthetic sets: success, distance from the Cramer-Rao bound, coverage, time
 	$(PY) benchmarks/identification_study.py --sets="$$ANTIWINDUP_SETS"
-referee: $(READY) ## compare CASES random cases of SEED with independent numerics, all that is said of them
-	$(PY) -m benchmarks.referee --cases="$$ANTIWINDUP_CASES" --seed="$$ANTIWINDUP_SEED"
+referee: $(READY) ## compare CASES (200) random cases of SEED with independent numerics, all that is said of them
+	$(PY) -m benchmarks.referee --cases="$${ANTIWINDUP_CASES:-200}" --seed="$$ANTIWINDUP_SEED"
+fuzz: $(READY) ## give the commands CASES (10000) damaged files, odd numbers and odd names of each kind, of SEED; faults: build/fuzz
+	$(PY) -m benchmarks.fuzz --cheap --cases="$${ANTIWINDUP_CASES:-10000}" --seed="$$ANTIWINDUP_SEED" --keep=build/fuzz
+	$(PY) -m benchmarks.fuzz --cases=100 --seed="$$ANTIWINDUP_SEED" --keep=build/fuzz
 faults: $(READY) ## interrupt, kill, starve and double the commands TIMES times each with SEED; measure large inputs
 	$(PY) -m benchmarks.interrupts --times="$$ANTIWINDUP_TIMES" --seed="$$ANTIWINDUP_SEED"
 	$(PY) -m benchmarks.faults --times="$$ANTIWINDUP_TIMES" --seed="$$ANTIWINDUP_SEED"
-	$(PY) -m benchmarks.size_study
+	$(PY) benchmarks/size_study.py
 audit: $(AUDIT_READY) ## look the locked packages up in the database of known vulnerabilities (needs the network)
 	.venv/bin/pip-audit --strict --disable-pip --requirement requirements.lock --requirement requirements-bench.lock
 lint: $(READY) ## check style and types

@@ -51,7 +51,7 @@ for command in commands:
     room, *words = command.split()
     group = importlib.import_module(room + ".__main__").main
     if command in RUNS:
-        group([*words, *RUNS[command]], standalone_mode=False)
+        group.main([*words, *RUNS[command]], standalone_mode=False)
     else:
         found = group
         for word in words:

@@ -346,7 +346,10 @@ def test_a_scheduler_that_dies_leaves_what_is_done(folder: Path) -> None:
         (["--limit", "-3"], "--limit is -3"),
         (["--scheduler", "nonsense"], "--scheduler nonsense: no Dask scheduler answers there"),
         (["--scheduler", "foo://host:1"], "no Dask scheduler answers there"),
-        (["--output", "nowhere/campaign.parquet"], "nowhere: no such folder"),
+        (
+            ["--output", "nowhere/campaign.parquet"],
+            "nowhere/campaign.parquet: cannot be written (No such file or directory)",
+        ),
     ],
 )
 def test_refusals(folder: Path, arguments: list[str], part: str) -> None:

@@ -157,8 +157,8 @@ def test_a_folder_that_cannot_hold_parts_is_refused_before_anything_runs(
         "file.parquet": "file.parquet.parts: cannot be written; expected a folder",
         "folder.parquet": "is a directory",
         "design.json": "is an input too",
-        "design.json/mine.parquet": "design.json: no such folder",
-        "nowhere/mine.parquet": "nowhere: no such folder",
+        "design.json/mine.parquet": "mine.parquet: cannot be written",
+        "nowhere/mine.parquet": "mine.parquet: cannot be written (No such file or directory)",
     }.items():
         before = sorted(tmp_path.rglob("*"))
         result = run(design, 1, tmp_path / name)
