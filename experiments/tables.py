@@ -8,7 +8,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from identification.base.errors import InputError
+from identification.base.errors import LONGEST, InputError
 from identification.base.files import read_text, require_folder, write_whole
 
 if TYPE_CHECKING:  # a command line need not wait for it
@@ -53,7 +53,9 @@ def read_cells(path: Path, columns: Sequence[str]) -> pd.DataFrame:
         raise InputError(f"{path}, line {reader.line_num}: {error}; expected comma-separated values") from None
     header = rows[0] if rows else []
     if header != list(columns):
-        raise InputError(f"{path}: the columns are {', '.join(header) or 'none'}; expected {', '.join(columns)}")
+        raise InputError(
+            f"{path}: the columns are {', '.join(header)[:LONGEST] or 'none'}; expected {', '.join(columns)}"
+        )
     if len(rows) == 1:
         raise InputError(f"{path}: no rows below the names of the columns")
     return pd.DataFrame(rows[1:], columns=list(columns), dtype=str)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 from pathlib import Path
 
 import click
@@ -64,7 +65,11 @@ def run_campaign(
     digest = hashlib.sha256(read_bytes(design)).hexdigest()
     campaign = Campaign(content, digest, seed, reference, limit, periods, code_sha256())
     with locked_file(output):
-        _complete(CampaignFile(output, campaign, plants, design, anew), campaign, plants, scheduler)
+        file = CampaignFile(output, campaign, plants, design, anew)
+        there = plants - sum(last - first for first, last in file.missing)
+        _complete(file, campaign, plants, scheduler)
+    if there:
+        click.echo(f"{there} of {plants} plants were there already")
     summary = campaign_tables(output)["campaign_summary"]
     click.echo(_promised(summary))
     click.echo(f"{plants} plants within W_a -> {output}; limits +-{limit:.6g}, {campaign.horizon_s:.6g} s each")
@@ -76,14 +81,13 @@ def _complete(file: CampaignFile, campaign: Campaign, plants: int, scheduler: st
     """Run what is missing, and write the file."""
     missing = file.missing
     left = sum(last - first for first, last in missing)
-    if left < plants:
-        click.echo(f"{plants - left} of {plants} plants are there already", err=True)
     if missing:
-        runs = f"{left} plants, {len(RUNS)} runs of {campaign.horizon_s:.6g} s each"
-        click.echo(f"{runs}; what is done is kept in {file.folder}", err=True)
         done = run_here(campaign, missing) if scheduler is None else run_on_cluster(campaign, missing, scheduler)
         try:
             with tqdm(total=plants, initial=plants - left, desc="campaign", unit=" plants", disable=None) as bar:
+                runs = f"{left} plants, {len(RUNS)} runs of {campaign.horizon_s:.6g} s each"
+                if not bar.disable:
+                    bar.write(f"{runs}; what is done is kept in {file.folder}", file=sys.stderr)
                 for chunk, columns in done:
                     file.keep(chunk, columns)
                     left -= chunk[1] - chunk[0]

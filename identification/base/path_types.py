@@ -15,7 +15,7 @@ class _Path(click.Path):
     """A path that is not empty: an empty one would be the current folder."""
 
     def __init__(self, **allowed: bool) -> None:
-        super().__init__(path_type=Path, **allowed)
+        super().__init__(path_type=Path, readable=False, **allowed)  # who reads says what is wrong
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         if not str(value):

@@ -274,7 +274,7 @@ def test_a_killed_command_goes_on(folder: Path, whole: bytes) -> None:
 
     result = run(folder, "resumed.parquet")
     assert result.exit_code == 0, result.output
-    assert f"{there} of {PLANTS} plants are there already" in result.stderr
+    assert f"{there} of {PLANTS} plants were there already" in result.stdout
     assert (folder / "resumed.parquet").read_bytes() == whole
     assert not parts.exists()
 
@@ -330,8 +330,7 @@ def test_a_scheduler_that_dies_leaves_what_is_done(folder: Path) -> None:
         thread.join()
         worker.kill()
     assert result.returncode == 2
-    said, sentence = result.stderr.splitlines()
-    assert said.endswith(f"what is done is kept in {parts}")
+    (sentence,) = result.stderr.splitlines()
     assert "the cluster gave up (" in sentence
     assert sentence.endswith("; the same command goes on from what is done")
     left = 2 * len(list(parts.glob("part-*.parquet")))
