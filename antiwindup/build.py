@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import cached_property
 from graphlib import TopologicalSorter
 from hashlib import sha256
 from multiprocessing.connection import wait
@@ -56,8 +57,8 @@ class Build:
         The steps that are run, with those that they need. Of the others, what hangs on files that were made anew is
         removed.
     goes_on
-        Whether a step that refuses stops only those that need its outputs. The first step stops everything. What was
-        refused is asked again in every build.
+        Whether a step that refuses, if it is not vital, stops only those that need its outputs. What was refused is
+        asked again in every build.
     jobs
         How many run at once.
     force
@@ -77,6 +78,16 @@ class Build:
     _made: list[Step] = field(default_factory=list)
     _running: dict[int, _Running] = field(default_factory=dict)
 
+    @cached_property
+    def needed(self) -> list[Step]:
+        """The steps that are wanted and those that they need, in their order."""
+        found, read = [], set[Path]()
+        for step in reversed(self.steps):
+            if step in self.wanted or read & {*step.outputs}:
+                found.append(step)
+                read |= {*step.needs, *step.uses}
+        return found[::-1]
+
     def run(self, tell: Tell) -> None:
         """Bring the files up to date.
 
@@ -93,11 +104,10 @@ class Build:
             if not self.force:
                 self._folder.require_free(places)
             self._folder.remove({self.path / name for name in self._folder.written} - {*places})
-            steps = self._before(self.wanted)
             try:
-                for ended, _ in enumerate(self._ended(steps)):
+                for ended, _ in enumerate(self._ended()):
                     tell(ended + 1, [running.step.name for running in self._running.values()])
-                others = [step for step in self._after(self._made) if step not in steps]
+                others = [step for step in self._after(self._made) if step not in self.needed]
                 self._remove([step for step in others if not self._folder.holds(self._source(step), step.outputs)])
             finally:
                 for running in self._running.values():
@@ -106,8 +116,9 @@ class Build:
                     running.closing.close()
                 self._folder.save()
 
-    def _ended(self, steps: Sequence[Step]) -> Iterator[Step]:
+    def _ended(self) -> Iterator[Step]:
         """The steps as they end."""
+        steps = self.needed
         makers = {output: step for step in steps for output in (*step.outputs, step.refusal)}
         sorter = TopologicalSorter(
             {step: {makers[path] for path in (*step.needs, *step.uses) if path in makers} for step in steps}
@@ -167,7 +178,7 @@ class Build:
             and not any(line.startswith(USAGE) for line in before)
         )
         sentence = sentence.removeprefix(REFUSED)
-        if not is_refusal or step is self.steps[0] or not self.goes_on:
+        if not is_refusal or step.is_vital or not self.goes_on:
             self._remove(self._after([step]))
             if is_refusal:
                 raise InputError(sentence)
@@ -186,15 +197,6 @@ class Build:
 
     def _remove(self, steps: Sequence[Step]) -> None:
         self._folder.remove(path for step in steps for path in (*step.outputs, step.refusal))
-
-    def _before(self, wanted: Sequence[Step]) -> list[Step]:
-        """The steps that are wanted and those that they need, in their order."""
-        found, read = [], set[Path]()
-        for step in reversed(self.steps):
-            if step in wanted or read & {*step.outputs}:
-                found.append(step)
-                read |= {*step.needs, *step.uses}
-        return found[::-1]
 
     def _after(self, made: Sequence[Step]) -> list[Step]:
         """Steps and those that hang on what they make, in their order."""

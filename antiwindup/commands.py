@@ -6,6 +6,7 @@ Each command imports what it runs, so that a command line answers at once.
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Sequence
 from math import inf
 from pathlib import Path
@@ -16,8 +17,8 @@ from click.core import ParameterSource
 
 from identification.__main__ import fit_options
 from identification.base.command_line import together
-from identification.base.errors import InputError, MissingFile
-from identification.base.files import is_file, true_path
+from identification.base.errors import InputError, shown
+from identification.base.files import require_readable, true_path
 
 if TYPE_CHECKING:
     from antiwindup.steps import Asked, Step
@@ -99,15 +100,16 @@ def _asked(
 ) -> tuple[Asked, dict[str, Any]]:
     """What a build is for, with files that are there; and how it is run."""
     from antiwindup.steps import Asked
+    from design.asked_model import asked_model
     from identification.sweeps.read_sweeps import input_files
 
     if not output or true_path(Path(output)) == Path(true_path(Path(output)).anchor):
-        raise InputError(f"--output is {output!r}; expected a folder for the outputs alone")
+        raise InputError(f"--output is {shown(output)}; expected a folder for the outputs alone")
     if limit is not None and not 0 < limit < inf:
         raise InputError(f"--limit is {limit:g}; expected a positive number")
     for name in (*sweeps, *([model] if model else ()), output):
         if "\n" in name:
-            raise InputError(f"{name!r}: holds a line break; expected a name of one line")
+            raise InputError(f"{shown(name)}: holds a line break; expected a name of one line")
     given = [
         name for name in fit if click.get_current_context().get_parameter_source(name) == ParameterSource.COMMANDLINE
     ]
@@ -121,9 +123,10 @@ def _asked(
         )
     ]
     asked = Asked(Path(output), model, sweeps, tuple(input_files(sweeps)), tuple(words), limit, plants)
-    for path in (*asked.sweep_files, *(asked.model_files if model else ())):
-        if not is_file(path):
-            raise MissingFile(f"{path}: no such file; expected a sweep, or a model.json, table or implied")
+    for path in asked.sweep_files:
+        require_readable(path)
+    if model is not None:
+        asked_model(model)
     return asked, {"jobs": jobs or os.cpu_count() or 1, "force": force}
 
 
@@ -131,15 +134,22 @@ def _build(asked: Asked, steps: Sequence[Step], wanted: Sequence[Step], goes_on:
     """Run what a build lacks and say what came out."""
     from tqdm import tqdm
 
-    from antiwindup.build import Build
+    from antiwindup.build import Build, Crash
 
     build = Build(asked.folder, steps, wanted, goes_on, jobs, force)
-    with tqdm(total=len(steps), unit="", disable=None, leave=False) as bar:
+    with tqdm(total=len(build.needed), unit="", disable=None, leave=False) as bar:
 
         def tell(ended: int, running: Sequence[str]) -> None:
             bar.set_description(", ".join(running), refresh=False)
             bar.update(ended - bar.n)
 
-        build.run(tell)
-    click.echo("".join(build.printed[name] for name in ("fit", "summary", "report") if name in build.printed), nl=False)
-    click.echo(f"{len(build.printed)} of {len(steps)} steps were run, {len(build.refused)} refused -> {asked.folder}")
+        try:
+            build.run(tell)
+        except Crash as crash:
+            bar.close()
+            click.echo(str(crash), err=True)
+            sys.exit(1)
+    click.echo(build.printed.get("fit", ""), nl=False)
+    for name, sentence in build.refused.items():
+        click.echo(f"{name} was refused: {sentence}")
+    click.echo(f"{len(build.printed)} steps were run, {len(build.refused)} refused -> {asked.folder}")

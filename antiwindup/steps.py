@@ -29,6 +29,8 @@ class Step:
         The files that it cannot do without.
     uses
         Files of which it reads those that are there.
+    is_vital
+        Whether a build stops when it refuses, whatever else does not.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Step:
     outputs: tuple[Path, ...]
     needs: tuple[Path, ...] = ()
     uses: tuple[Path, ...] = ()
+    is_vital: bool = False
 
     @property
     def refusal(self) -> Path:
@@ -115,9 +118,8 @@ def report_steps(asked: Asked, before: Sequence[Step]) -> list[Step]:
     made = tuple(
         path for step in before for path in (*step.outputs, step.refusal) if path.suffix not in (".pdf", ".png")
     )
-    reported = Step(
-        "report", page, (folder / "report" / "index.html",), (*asked.model_files, *files, folder / "claims.csv"), made
-    )
+    needs, output = (*asked.model_files, *files, folder / "claims.csv"), folder / "report" / "index.html"
+    reported = Step("report", page, (output,), needs, made, is_vital=True)
     return [judged, reported]
 
 
@@ -126,7 +128,7 @@ def _fit(asked: Asked) -> list[Step]:
         return []
     model, responses = asked.folder / "model.json", asked.folder / "responses.npz"
     command = ("identification", "fit", *asked.fit, "--output", str(model), "--responses", str(responses))
-    return [Step("fit", (*command, "--", *asked.sweeps), (model, responses), asked.sweep_files)]
+    return [Step("fit", (*command, "--", *asked.sweeps), (model, responses), asked.sweep_files, is_vital=True)]
 
 
 def _designs(asked: Asked) -> list[Step]:
@@ -222,13 +224,7 @@ def _summary(asked: Asked, made: Sequence[Step]) -> Step:
     command = ("paper_figures", "summary", "--build", str(folder), "--", asked.chosen, *tests)
     outputs = tuple(folder / f"summary.{kind}" for kind in ("pdf", "svg", "png", "txt"))
     uses = tuple(path for step in made for path in (*step.outputs, step.refusal))
-    return Step(
-        "summary",
-        command,
-        outputs,
-        (*asked.model_files, *files),
-        tuple(path for path in uses if path not in (*asked.model_files, *files)),
-    )
+    return Step("summary", command, outputs, (*asked.model_files, *files), uses, is_vital=True)
 
 
 def _csv(folder: Path, *names: str) -> tuple[Path, ...]:

@@ -130,7 +130,7 @@ def main() -> None:
         options = ["--reference-omega", "1.5", "--a", "4", "--e", "2", "--f", "1"]
         measured([python, "-m", "design", "extended", "implied", *options, "--output", str(folder / "design.json")])
         run = measured([python, "-c", CAMPAIGN, name, str(sizes.plants)])
-        failed |= not _said("campaign, plants (runs made up)", sizes.plants, run, 0, 600.0, bare + 300.0)
+        failed |= not _said("campaign, plants (runs made up)", sizes.plants, run, 0, 600.0, bare + 100.0)
     sys.exit(int(failed))
 
 

@@ -130,7 +130,8 @@ class CampaignFile:
                 for batch in self._read(number).to_batches():
                     seal.update(batch)
         schema = schema.with_metadata(self._metadata | {SEAL: str(seal)})
-        with parquet.ParquetWriter(partial, schema) as writer:
+        # Arrow takes no name that is not UTF-8
+        with partial.open("wb") as opened, parquet.ParquetWriter(opened, schema) as writer:
             for group in groups:
                 writer.write_table(pyarrow.concat_tables(map(self._read, group)).cast(schema))
 

@@ -21,7 +21,7 @@ PERCENT = (5, 50, 95)  # of the plants, in the summary
 BINS = 10  # of the distance
 OUTCOMES = ("linear_stable", "diverged", "recovered", "covered")
 
-ROWS = 65536  # that are held at a time
+ROWS = 8192  # that are held at a time
 MOST_SAID = 200  # characters of what Arrow says
 DIGIT = 8  # bits of the quantiles that one reading of the file settles
 

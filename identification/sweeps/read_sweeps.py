@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from identification.base.arrays import Complex, Real
-from identification.base.errors import InputError
+from identification.base.errors import InputError, printable
 from identification.base.files import is_folder, require_readable, true_path
 from identification.formats.columns import Table
 from identification.formats.csv_file import read_csv
@@ -98,7 +98,7 @@ def _files_in(folder: Path) -> list[Path]:
 
 
 def _names(files: Sequence[Path]) -> list[str]:
-    """Each file's base name, with as many of its folders as tell it from the others of that base name."""
+    """Each file's base name, printable, with as many of its folders as tell it from the others of that name."""
     names = []
     for file in files:
         parts = file.absolute().parts
@@ -106,7 +106,7 @@ def _names(files: Sequence[Path]) -> list[str]:
         length = 1
         while any(other[-length:] == parts[-length:] for other in others):
             length += 1
-        names.append("/".join((*parts[-length:-1], file.name)))
+        names.append(printable("/".join((*parts[-length:-1], file.name))))
     return names
 
 

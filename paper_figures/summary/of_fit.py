@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import hypot
 
 from identification.base.digits import lower_end
-from identification.base.errors import InputError
+from identification.base.errors import InputError, printable
 from identification.fitting.nominal_plant import ONE_PLANT
 from identification.model.fit_record import FitRecord
 from identification.model.model_file import IdentifiedModel
@@ -126,7 +126,7 @@ def _few(names: Sequence[str]) -> str:
 
 
 def _tests(tests: Sequence[FrequencyResponse]) -> str:
-    counts = Counter(test.path.name if test.path else test.name for test in tests)
+    counts = Counter(printable(test.path.name) if test.path else test.name for test in tests)
     files = [name if count in (1, len(tests)) else f"{name} ({count} tests)" for name, count in counts.items()]
     low, high = min(test.omega[0] for test in tests), max(test.omega[-1] for test in tests)
     return (

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import antiwindup.build
+from antiwindup.__main__ import main as antiwindup_command
 from antiwindup.build import Build, Crash
 from antiwindup.steps import Asked, Step, refit_steps, report_steps, thesis_steps
 from identification.base.errors import InputError
@@ -284,3 +288,53 @@ def test_a_refused_build_leaves_no_folder(refit: Refit, behaviour: dict[str, str
     with pytest.raises(InputError):
         refit()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv"]
+
+
+SWEEP = Path(__file__).resolve().parents[2] / "data" / "elevation" / "synthetic_test_1_frf.csv"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["refit", str(SWEEP), "--output", ""], "--output is ''; expected a folder for the outputs alone"),
+        (["refit", str(SWEEP), "--output", "/"], "--output is '/'; expected a folder"),
+        (["refit", str(SWEEP), "--output", "root"], "--output is 'root'; expected a folder"),  # a link to /
+        (["refit", str(SWEEP), "--output", "a\nb"], r"'a\nb': holds a line break"),
+        (["refit", "a\nb.csv", "--output", "mine"], r"'a\nb.csv': holds a line break"),
+        (["refit", "nowhere.csv", "--output", "mine"], "nowhere.csv: no such file"),
+        (["refit", ".", "--output", "mine"], ".: holds no file that ends in .csv"),
+        (["refit", str(SWEEP), "--output", "file"], "file: cannot be made (File exists)"),
+        (["refit", str(SWEEP), "--output", "mine", "--limit", "nan"], "--limit is nan; expected a positive number"),
+        (["figures", str(SWEEP), "--output", "mine", "--model", "nowhere.json"], "nowhere.json: no such file"),
+        (["report", str(SWEEP), "--output", "mine", "--model", "nothing"], "nothing"),
+        (["figures", str(SWEEP), "--output", "mine", "--only", "fig_9"], "--only is 'fig_9'; expected one of fig_2_01"),
+    ],
+    ids=str,
+)
+def test_a_build_is_refused_before_its_folder_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], part: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    (tmp_path / "root").symlink_to("/")
+    before = sorted(tmp_path.iterdir())
+    result = CliRunner().invoke(antiwindup_command, arguments)
+    assert result.exit_code == 2
+    assert len(result.stderr.splitlines()) == 1
+    assert part in result.stderr
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_build_draws_and_draws_nothing_twice(tmp_path: Path) -> None:
+    """With its processes, into a folder with an odd name."""
+    output = tmp_path / os.fsdecode(b"my '$(folder)' \xff")
+    drawn = ["figures", str(SWEEP), "--model", "implied", "--only", "fig_2_01", "--output", str(output)]
+    command = [sys.executable, "-m", "antiwindup", *drawn]
+    for steps in (1, 0):
+        done = subprocess.run(command, cwd=SWEEP.parents[2], capture_output=True, check=False)
+        assert done.returncode == 0, done.stderr
+        assert done.stderr == b""
+        assert done.stdout.startswith(f"{steps} steps were run, 0 refused -> ".encode())
+    figures = sorted(path.name for path in (output / "figures").iterdir())
+    assert figures == [f"fig_2_01.{kind}" for kind in ("pdf", "png", "svg", "txt")]
+    assert sorted(path.name for path in output.iterdir()) == ["figures", "manifest.json"]

@@ -180,3 +180,9 @@ def test_the_parts_of_another_campaign_go_on_request_and_nothing_else_does(
     CampaignFile(other.output, campaign, PLANTS, design, anew=True)
     assert {path.name for path in other.folder.iterdir()} == {damaged.name, notes.name}
     assert notes.read_text(encoding="utf-8") == "mine"
+
+
+def test_a_file_may_have_a_name_that_is_not_utf_8(campaign: Campaign, design: Path, tmp_path: Path) -> None:
+    file = kept(tmp_path / os.fsdecode(b"\xff.parquet"), campaign, design)
+    file.finish()
+    assert file.output.stat().st_size > 0

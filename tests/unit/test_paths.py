@@ -29,8 +29,10 @@ from identification.base.files import (
     true_path,
 )
 from identification.model.model_file import IdentifiedModel, read_model
+from identification.sweeps.read_sweeps import read_sweeps
 from paper_figures.__main__ import main as paper_figures
 from paper_figures.look import style
+from paper_figures.summary.of_fit import _tests as said_of
 
 OUTPUTS = ("output", "build", "page", "responses")
 ODD = ("loop", "loop/a", "x" * 300, "model.json/a", "missing/a", "pipe", "locked/a", os.fsdecode(b"\xff/a"))
@@ -174,3 +176,13 @@ def test_no_path_of_a_user_is_looked_at_but_by_what_raises_nothing() -> None:
     modules = [path for room in rooms for path in (root / room).rglob("*.py")]
     found = {path.relative_to(root).as_posix() for path in modules if LOOKS.search(path.read_text(encoding="utf-8"))}
     assert found <= set(LOOKED_AT)
+
+
+def test_a_test_has_a_printable_name_whatever_its_file_is_called(tmp_path: Path) -> None:
+    file = tmp_path / os.fsdecode(b"\xff\x1b.csv")
+    rows = "".join(f"{line},1,1\n" for line in range(1, 20))
+    file.write_text(f"frequency_hz,real,imag\n{rows}", encoding="utf-8")
+    (test,) = read_sweeps(file)
+    assert test.name == r"\udcff\x1b.csv"
+    assert test.path == file
+    assert said_of([test]).isprintable()

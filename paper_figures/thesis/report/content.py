@@ -14,7 +14,7 @@ import pandas as pd
 from design.auditing.as_text import audit_text
 from design.auditing.audit_design import audit
 from design.design_file import Design
-from identification.base.errors import InputError
+from identification.base.errors import InputError, printable
 from identification.model.plant import PlantModel
 from identification.output.fit_facts import bound_text
 from paper_figures.look.captions import number
@@ -155,7 +155,7 @@ def _values(plant: PlantModel) -> Table:
 
 
 def _not_fitted(inputs: Inputs) -> tuple[Paragraph, ...]:
-    names = {test.path.name if test.path else test.name: None for test in inputs.tests}
+    names = {printable(test.path.name) if test.path else test.name: None for test in inputs.tests}
     beside = f" The sweeps {', '.join(names)} only stand beside it in Fig. 2.9." if names else ""
     return (
         ("Not fitted here", f"The model is {_source(inputs, False)}, so there are no intervals.{beside}"),
