@@ -103,7 +103,7 @@ class Build:
             places = [path for step in self.steps for path in (*step.outputs, step.refusal)]
             if not self.force:
                 self._folder.require_free(places)
-            self._folder.remove({self.path / name for name in self._folder.written} - {*places})
+            self._folder.forget_all_but(places)
             try:
                 for ended, _ in enumerate(self._ended()):
                     tell(ended + 1, [running.step.name for running in self._running.values()])

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from identification.base.errors import InputError
-from identification.base.files import require_replaceable
+from identification.base.files import is_there, require_folder, require_replaceable
 from identification.base.manifest import Written, content_of, write_manifest
 
 
@@ -42,6 +42,9 @@ class OutputFolder:
 
     def require_free(self, paths: Sequence[Path]) -> None:
         """Refuse, with an InputError, places of outputs that hold what the project did not write or may not replace."""
+        for folder in {path.parent for path in paths}:
+            if is_there(folder):
+                require_folder(folder)
         for path in paths:
             written = self.written.get(self.name(path))
             if written is None and os.path.lexists(path):
@@ -76,12 +79,18 @@ class OutputFolder:
             self.written[name] = Written(self.written[name].source, self.content(path))
 
     def remove(self, paths: Iterable[Path]) -> None:
-        """Remove those files that the project wrote and nobody changed; what was changed is the user's from now on."""
+        """Remove those files that the project wrote or has begun; what was changed since is the user's from now on."""
         for path in paths:
             written = self.written.pop(self.name(path), None)
-            if written and (written.content is None or written.content == content_of(path)):
+            if written and written.content in (None, content_of(path)):
                 path.unlink(missing_ok=True)
             self.contents.pop(path, None)
+
+    def forget_all_but(self, paths: Iterable[Path]) -> None:
+        """Remove all other files that the project wrote and nobody changed; that one was begun says nothing of it."""
+        others = set(self.written) - {self.name(path) for path in paths}
+        self.remove(self.path / name for name in others if self.written[name].content is not None)
+        self.written = {name: written for name, written in self.written.items() if name not in others}
 
     def save(self) -> None:
         """Write the manifest."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from identification.base.errors import InputError, MissingFile
+from identification.base.errors import InputError, MissingFile, shown
 from identification.base.files import read_bytes, write_whole
 from identification.base.json_object import member, read_json, record
 
@@ -43,6 +43,9 @@ def read_manifest(folder: Path) -> dict[str, Written]:
     path = folder / NAME
     try:
         files = member(read_json(path, SCHEMA), "files")
+        for name in files:
+            if Path(name).is_absolute() or ".." in Path(name).parts:
+                raise InputError(f"{shown(name)} leads out of the folder; expected the name of a file in it")
         return {name: record(Written, member(files, name)) for name in files}
     except MissingFile:
         return {}

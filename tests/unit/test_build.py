@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -275,6 +276,34 @@ def test_a_write_protected_output_is_refused_before_anything_is_done(refit: Refi
     assert built(tmp_path) == before
     refit(force=True)
     assert built(tmp_path)["summary.txt"] != before["summary.txt"]
+
+
+@pytest.mark.parametrize("name", ["../outside.txt", "/outside.txt", "results/../../outside.txt"])
+def test_a_manifest_that_leads_out_of_the_folder_is_refused(refit: Refit, tmp_path: Path, name: str) -> None:
+    (tmp_path / "outside.txt").write_text("mine", encoding="utf-8")
+    (tmp_path / "mine").mkdir()
+    listed = {"schema": 1, "files": {name: {"source": "", "content": None}}}
+    (tmp_path / "mine" / "manifest.json").write_text(json.dumps(listed), encoding="utf-8")
+    with pytest.raises(InputError, match=r"manifest\.json: '.*' leads out of the folder"):
+        refit()
+    assert (tmp_path / "outside.txt").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_file_that_was_begun_by_another_kind_of_build_is_left(refit: Refit, tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    listed = {"schema": 1, "files": {"notes.md": {"source": "", "content": None}}}
+    (tmp_path / "mine" / "manifest.json").write_text(json.dumps(listed), encoding="utf-8")
+    (tmp_path / "mine" / "notes.md").write_text("mine", encoding="utf-8")
+    refit()
+    assert built(tmp_path)["notes.md"] == "mine"
+
+
+def test_a_file_in_the_place_of_a_folder_is_refused_before_anything_is_done(refit: Refit, tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "results").write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match="results: no such folder"):
+        refit()
+    assert built(tmp_path) == {"results": "mine"}
 
 
 def test_two_builds_of_one_folder(refit: Refit, tmp_path: Path) -> None:
