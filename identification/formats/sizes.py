@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from identification.base.errors import InputError, MissingFile
+from identification.base.errors import InputError
+from identification.base.files import require_readable
 
 MOST_BYTES = 10**9  # of a file of text, or of what is read of one that is compressed
 
@@ -19,13 +20,8 @@ def require_size(path: Path) -> None:
     InputError
         It is larger, or cannot be looked at.
     """
-    try:
-        size = path.stat().st_size
-    except FileNotFoundError:
-        raise MissingFile(f"{path}: no such file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    require_bytes(f"{path}: holds", size)
+    require_readable(path)
+    require_bytes(f"{path}: holds", path.stat().st_size)
 
 
 def require_bytes(what: str, size: int) -> None:
