@@ -110,24 +110,22 @@ def _asked(
     for name in (*sweeps, *([model] if model else ()), output):
         if "\n" in name:
             raise InputError(f"{shown(name)}: holds a line break; expected a name of one line")
-    given = [
-        name for name in fit if click.get_current_context().get_parameter_source(name) == ParameterSource.COMMANDLINE
-    ]
-    words = [
-        word
-        for name in given
-        for value in (fit[name],)
-        for word in (
-            f"--{name.replace('_', '-')}",
-            "/".join(map(str, value)) if isinstance(value, tuple) else str(value),
-        )
-    ]
+    source = click.get_current_context().get_parameter_source
+    given = {name: value for name, value in fit.items() if source(name) == ParameterSource.COMMANDLINE}
+    words = [word for name, value in given.items() for word in (f"--{name.replace('_', '-')}", _word(value))]
     asked = Asked(Path(output), model, sweeps, tuple(input_files(sweeps)), tuple(words), limit, plants)
     for path in asked.sweep_files:
         require_readable(path)
     if model is not None:
         asked_model(model)
     return asked, {"jobs": jobs or os.cpu_count() or 1, "force": force}
+
+
+def _word(value: object) -> str:
+    """A value of an option of the fit as a command line has it: auto, numbers of zeros and poles, or as it is."""
+    if value is None:
+        return "auto"
+    return "/".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 def _build(asked: Asked, steps: Sequence[Step], wanted: Sequence[Step], goes_on: bool, jobs: int, force: bool) -> None:

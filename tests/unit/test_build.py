@@ -367,3 +367,18 @@ def test_a_build_draws_and_draws_nothing_twice(tmp_path: Path) -> None:
     figures = sorted(path.name for path in (output / "figures").iterdir())
     assert figures == [f"fig_2_01.{kind}" for kind in ("pdf", "png", "svg", "txt")]
     assert sorted(path.name for path in output.iterdir()) == ["figures", "manifest.json"]
+
+
+def test_the_options_of_the_fit_are_those_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fits: list[tuple[str, ...]] = []
+    monkeypatch.setattr(Build, "run", lambda build, tell: fits.append(build.steps[0].command))
+    asked = ["--modes", "1/2", "--real", "auto", "--bound-order", "3", "--loss", "soft-l1"]
+    for given in ([], asked):
+        result = CliRunner().invoke(
+            antiwindup_command, ["refit", str(SWEEP), "--output", str(tmp_path / "mine"), *given]
+        )
+        assert result.exit_code == 0, result.output
+        output = ["--output", str(tmp_path / "mine" / "model.json"), "--responses"]
+        assert list(fits[-1]) == [
+            *("identification", "fit", *given, *output, str(tmp_path / "mine" / "responses.npz"), "--", str(SWEEP))
+        ]
