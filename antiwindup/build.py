@@ -20,7 +20,6 @@ from antiwindup.worker import start
 from identification.base.errors import InputError
 from identification.base.files import is_folder, partial_file, write_whole
 from identification.base.folder_lock import locked_folder
-from identification.base.manifest import read_manifest
 
 REFUSED, USAGE = "Error: ", "Usage: "
 
@@ -53,9 +52,11 @@ class Build:
     steps
         All that belongs into the folder, each after those that it needs. What the project wrote there before and no
         step writes is removed.
+    inputs
+        The files that the steps are given, which are none of the outputs.
     wanted
-        The steps that are run, with those that they need. Of the others, what hangs on files that were made anew is
-        removed.
+        The steps that are run, with those that they need. Of the others, what is not of the same inputs, options and
+        code is removed.
     goes_on
         Whether a step that refuses, if it is not vital, stops only those that need its outputs. What was refused is
         asked again in every build.
@@ -69,13 +70,13 @@ class Build:
 
     path: Path
     steps: Sequence[Step]
+    inputs: Sequence[Path]
     wanted: Sequence[Step]
     goes_on: bool
     jobs: int
     force: bool = False
     printed: dict[str, str] = field(default_factory=dict)
     refused: dict[str, str] = field(default_factory=dict)
-    _made: list[Step] = field(default_factory=list)
     _running: dict[int, _Running] = field(default_factory=dict)
 
     @cached_property
@@ -99,16 +100,18 @@ class Build:
             A step ended in no way that it should.
         """
         with locked_folder(self.path):
-            self._folder = OutputFolder(self.path, read_manifest(self.path))
+            self._folder = OutputFolder(self.path)
             places = [path for step in self.steps for path in (*step.outputs, step.refusal)]
+            self._folder.require_no_input(self.inputs, places)
             if not self.force:
                 self._folder.require_free(places)
-            self._folder.forget_all_but(places)
+            self._folder.remove({self.path / name for name in self._folder.written} - {*places})
             try:
                 for ended, _ in enumerate(self._ended()):
                     tell(ended + 1, [running.step.name for running in self._running.values()])
-                others = [step for step in self._after(self._made) if step not in self.needed]
-                self._remove([step for step in others if not self._folder.holds(self._source(step), step.outputs)])
+                for step in self.steps:
+                    if step not in self.needed and not self._folder.holds(self._source(step), step.outputs):
+                        self._remove([step])
             finally:
                 for running in self._running.values():
                     running.process.terminate()
@@ -149,14 +152,14 @@ class Build:
             return True
         if folder.holds(source := self._source(step), step.outputs):
             return True
-        self._made.append(step)
         folder.begin(source, step.outputs)
         for path in step.outputs:
             if self.force and not is_folder(path):  # which the command refuses
                 path.unlink(missing_ok=True)
-        closing = ExitStack()
-        log = closing.enter_context(partial_file(self.path, ".log"))
-        process = start(step.command, log)
+        with ExitStack() as stack:
+            log = stack.enter_context(partial_file(self.path, ".log"))
+            process = start(step.command, log, folder.journal)
+            closing = stack.pop_all()
         self._running[process.sentinel] = _Running(step, source, process, log, closing)
         return False
 
@@ -182,6 +185,10 @@ class Build:
             self._remove(self._after([step]))
             if is_refusal:
                 raise InputError(sentence)
+            if (status := ended.process.exitcode or 0) < 0:
+                raise InputError(
+                    f"{step.name}: was ended by signal {-status}; the same command goes on from what is done"
+                )
             raise Crash(f"{step.name} ended with status {ended.process.exitcode}:\n{said}")
         self._remove([step])
         self.refused[step.name] = sentence

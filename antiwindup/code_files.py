@@ -8,6 +8,7 @@ beside the module or in data/thesis.
 from __future__ import annotations
 
 import ast
+import platform
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
@@ -109,7 +110,9 @@ def read(file: str) -> tuple[frozenset[str], dict[str, frozenset[str]]]:
 @cache
 def hash_of(files: frozenset[str]) -> str:
     """The hash of the contents of files of the project and of the versions of the packages it runs with."""
-    digests = [f"{file} {sha256((ROOT / file).read_bytes()).hexdigest()}" for file in sorted(files)]
+    digests = [platform.python_version()] + [
+        f"{file} {sha256((ROOT / file).read_bytes()).hexdigest()}" for file in sorted(files)
+    ]
     return sha256("\n".join([*digests, *_packages()]).encode()).hexdigest()
 
 
@@ -136,8 +139,14 @@ def _tables(figure: Path) -> tuple[str, ...]:
 def _packages() -> tuple[str, ...]:
     """What the project asks for and runs with, each package with its version; none where it is not installed itself."""
     try:
-        asked = metadata.requires("antiwindup-thesis") or []
+        asked = [*(metadata.requires("antiwindup-thesis") or []), "llvmlite"]
     except metadata.PackageNotFoundError:
         return ()
-    names = [re.split(r"[^\w.-]", each)[0] for each in asked if "extra ==" not in each]
-    return tuple(f"{name} {metadata.version(name)}" for name in names)
+    return tuple(f"{name} {_version(name)}" for name in sorted({re.split(r"[^\w.-]", each)[0] for each in asked}))
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not there"

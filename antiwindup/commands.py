@@ -134,7 +134,8 @@ def _build(asked: Asked, steps: Sequence[Step], wanted: Sequence[Step], goes_on:
 
     from antiwindup.build import Build, Crash
 
-    build = Build(asked.folder, steps, wanted, goes_on, jobs, force)
+    inputs = (*asked.sweep_files, *(asked.model_files if asked.model else ()))
+    build = Build(asked.folder, steps, inputs, wanted, goes_on, jobs, force)
     with tqdm(total=len(build.needed), unit="", disable=None, leave=False) as bar:
 
         def tell(ended: int, running: Sequence[str]) -> None:

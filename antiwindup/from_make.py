@@ -15,9 +15,12 @@ import shlex
 import sys
 from collections.abc import Mapping
 
+import click
+
 from antiwindup.__main__ import main
+from identification.__main__ import fit_options
 from identification.base.command_line import Refusal
-from identification.base.errors import InputError
+from identification.base.errors import InputError, shown
 
 PREFIX = "ANTIWINDUP_"
 
@@ -36,15 +39,28 @@ def arguments(build: str, variables: Mapping[str, str]) -> list[str]:
     Raises
     ------
     InputError
-        A quote in FIT or SWEEPS has no end.
+        A quote in FIT or SWEEPS has no end, FIT holds what is no option of the fit, or FORCE or REPORT another word.
     """
     given = {name: value for name, value in variables.items() if value}
     options = [f"--output={variables['OUTPUT']}"]
     options += [f"--{name.lower()}={given[name]}" for name in ("MODEL", "LIMIT", "PLANTS", "JOBS") if name in given]
     options += [f"--only={name}" for name in given.get("ONLY", "").split()]
-    options += ["--report"] if "REPORT" in given else []
-    options += ["--force"] if "FORCE" in given else []
-    return [build, *options, *_split("FIT", given.get("FIT", "")), "--", *words(given.get("SWEEPS", ""))]
+    for name in ("REPORT", "FORCE"):
+        if given.get(name, "yes") != "yes":
+            raise InputError(f"{name} is {shown(given[name])}; expected yes or nothing")
+        options += [f"--{name.lower()}"] if name in given else []
+    fit = _split("FIT", given.get("FIT", ""))
+    try:
+        only_fit.make_context("FIT", list(fit), resilient_parsing=False)
+    except click.ClickException as error:
+        raise InputError(f"FIT is {shown(given['FIT'])}: {error.format_message()}") from None
+    return [build, *options, *fit, "--", *words(given.get("SWEEPS", ""))]
+
+
+@click.command(add_help_option=False)
+@fit_options
+def only_fit(**_options: object) -> None:
+    """What FIT may hold."""
 
 
 def words(value: str) -> list[str]:

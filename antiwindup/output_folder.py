@@ -4,31 +4,46 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from identification.base.errors import InputError
-from identification.base.files import is_there, require_folder, require_replaceable
-from identification.base.manifest import Written, content_of, write_manifest
+from identification.base.files import is_file, note, require_folder, require_replaceable, true_path
+from identification.base.manifest import Written, content_of, read_journal, read_manifest, write_manifest
+
+JOURNAL = ".antiwindup.journal"
+"""What the steps of a build put into their places, while it runs: after a kill the manifest is not up to date."""
 
 
-@dataclass
 class OutputFolder:
     """What stands in a folder and what the project knows of it.
 
     Parameters
     ----------
     path
-        The folder.
+        The folder, which this process alone writes to. The files that a build had begun when it was killed are the
+        project's if they are as its journal has them, before or after; others are somebody else's.
+
+    Attributes
+    ----------
     written
         What its manifest lists.
-    contents
-        The SHA-256 of each file that was looked at, None of one that is not there.
+
+    Raises
+    ------
+    InputError
+        The manifest or the journal is none.
     """
 
-    path: Path
-    written: dict[str, Written]
-    contents: dict[Path, str | None] = field(default_factory=dict)
+    def __init__(self, path: Path) -> None:
+        self.path, self.journal, self._contents = path, path / JOURNAL, dict[Path, str | None]()
+        self.written = read_manifest(path)
+        noted = read_journal(self.journal)
+        for name, written in list(self.written.items()):
+            if written.content is None:
+                content = None if os.path.islink(path / name) else self.content(path / name)  # noqa: PTH114
+                del self.written[name]
+                if content in noted.get(str(path / name), set()):
+                    self.written[name] = Written("", content)
 
     def name(self, path: Path) -> str:
         """The name of a file in the manifest."""
@@ -36,28 +51,31 @@ class OutputFolder:
 
     def content(self, path: Path) -> str | None:
         """The SHA-256 of any file, None if it is not there."""
-        if path not in self.contents:
-            self.contents[path] = content_of(path)
-        return self.contents[path]
+        if path not in self._contents:
+            self._contents[path] = content_of(path)
+        return self._contents[path]
 
     def require_free(self, paths: Sequence[Path]) -> None:
         """Refuse, with an InputError, places of outputs that hold what the project did not write or may not replace."""
         for folder in {path.parent for path in paths}:
-            if is_there(folder):
+            if os.path.lexists(folder):
                 require_folder(folder)
         for path in paths:
             written = self.written.get(self.name(path))
-            if written is None and os.path.lexists(path):
+            if os.path.lexists(path) and (written is None or path.is_symlink()):
                 raise InputError(
                     f"{path}: is there already, written by somebody else; expected another folder, or --force"
                 )
-            if (
-                written is not None
-                and written.content is not None
-                and self.content(path) not in (None, written.content)
-            ):
+            if written is not None and self.content(path) not in (None, written.content):
                 raise InputError(f"{path}: was changed since it was written; expected another folder, or --force")
             require_replaceable(path)
+
+    def require_no_input(self, inputs: Iterable[Path], paths: Sequence[Path]) -> None:
+        """Refuse, with an InputError, inputs that are outputs, of this build or of another one into the folder."""
+        places = {true_path(path): path for path in (*(self.path / name for name in self.written), *paths)}
+        for path in inputs:
+            if (place := places.get(true_path(path))) is not None:
+                raise InputError(f"{path}: is an output in {place.parent} too; expected another folder to write to")
 
     def holds(self, source: str, paths: Iterable[Path]) -> bool:
         """Whether files stand there as they were written, from this source."""
@@ -65,12 +83,17 @@ class OutputFolder:
         return all(content is not None and written == Written(source, content) for written, content in found)
 
     def begin(self, source: str, paths: Iterable[Path]) -> None:
-        """Note, on the disk too, that files are about to be written: whatever stands there then is the project's."""
+        """Note, on the disk too, that files are about to be written; raises InputError where their folder cannot be."""
         for path in paths:
-            path.parent.mkdir(exist_ok=True)
+            try:
+                path.parent.mkdir(exist_ok=True)
+                if is_file(path):
+                    note(self.journal, {path: path})
+            except OSError as error:
+                raise InputError(f"{path}: cannot be written ({error.strerror})") from None
             self.written[self.name(path)] = Written(source, None)
-            self.contents.pop(path, None)
-        self.save()
+            self._contents.pop(path, None)
+        write_manifest(self.path, self.written)
 
     def end(self, paths: Iterable[Path]) -> None:
         """Note what the files that were begun hold."""
@@ -79,19 +102,25 @@ class OutputFolder:
             self.written[name] = Written(self.written[name].source, self.content(path))
 
     def remove(self, paths: Iterable[Path]) -> None:
-        """Remove those files that the project wrote or has begun; what was changed since is the user's from now on."""
-        for path in paths:
-            written = self.written.pop(self.name(path), None)
-            if written and written.content in (None, content_of(path)):
-                path.unlink(missing_ok=True)
-            self.contents.pop(path, None)
+        """Remove those files that the project wrote or has begun; what was changed since is the user's from now on.
 
-    def forget_all_but(self, paths: Iterable[Path]) -> None:
-        """Remove all other files that the project wrote and nobody changed; that one was begun says nothing of it."""
-        others = set(self.written) - {self.name(path) for path in paths}
-        self.remove(self.path / name for name in others if self.written[name].content is not None)
-        self.written = {name: written for name, written in self.written.items() if name not in others}
+        Raises
+        ------
+        InputError
+            A file may not be removed.
+        """
+        for path in paths:
+            written = self.written.get(self.name(path))
+            try:
+                if written and not path.is_symlink() and written.content in (None, content_of(path)):
+                    path.unlink(missing_ok=True)
+            except OSError as error:
+                raise InputError(f"{path}: cannot be removed ({error.strerror})") from None
+            self.written.pop(self.name(path), None)
+            self._contents.pop(path, None)
 
     def save(self) -> None:
-        """Write the manifest."""
+        """Write the manifest; where nothing in it is only begun, it needs no journal any more."""
         write_manifest(self.path, self.written)
+        if all(written.content for written in self.written.values()):
+            self.journal.unlink(missing_ok=True)

@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+from identification.base.errors import InputError
+from identification.base.files import keep_journal
 from identification.base.process import begin, leave_signals_to_parent, undisturbed
 
 PACKAGES = [
@@ -28,7 +30,7 @@ PACKAGES = [
 """What takes long to import."""
 
 
-def start(command: Sequence[str], log: Path) -> BaseProcess:
+def start(command: Sequence[str], log: Path, journal: Path) -> BaseProcess:
     """Start ``antiwindup COMMAND...``; what it prints goes to a file. When this process ends, so does that one.
 
     Parameters
@@ -37,18 +39,28 @@ def start(command: Sequence[str], log: Path) -> BaseProcess:
         The room and what stands after it on a command line; no shell reads it.
     log
         An existing file.
+    journal
+        Where it notes the files that it writes, see :func:`identification.base.files.keep_journal`.
+
+    Raises
+    ------
+    InputError
+        No process can be started.
     """
     has_server = "forkserver" in multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("forkserver") if has_server else multiprocessing.get_context("spawn")
     os.environ["PYTHONSAFEPATH"] = "1"  # the processes import nothing from the folder that they happen to run in
     context.set_forkserver_preload(PACKAGES)
-    process: BaseProcess = context.Process(target=_run, args=(tuple(command), str(log)))
-    with undisturbed:
-        process.start()
+    process: BaseProcess = context.Process(target=_run, args=(tuple(command), str(log), journal))
+    try:
+        with undisturbed:
+            process.start()
+    except (EOFError, OSError) as error:
+        raise InputError(f"no process can be started ({error or 'the first one ended'})") from None
     return process
 
 
-def _run(command: Sequence[str], log: str) -> None:
+def _run(command: Sequence[str], log: str, journal: Path) -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
     threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
@@ -58,6 +70,7 @@ def _run(command: Sequence[str], log: str) -> None:
     os.close(descriptor)
     leave_signals_to_parent()
     begin()
+    keep_journal(journal)
     from antiwindup.__main__ import main
 
     sys.argv = ["antiwindup", *command]

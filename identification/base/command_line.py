@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import gc
 import re
+import sys
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -71,7 +72,7 @@ class CommandGroup(Console):
         try:
             with np.errstate(over="raise"), warnings.catch_warnings(record=True) as held:  # a refusal is one sentence
                 result = super().invoke(ctx)
-            for each in held:
+            for each in held if sys.warnoptions else ():
                 warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
             return result
         except InputError as error:
@@ -86,6 +87,8 @@ class CommandGroup(Console):
                 raise
             extra = f'pip install "antiwindup-thesis[{EXTRAS[error.name]}]"'
             raise Refusal(f"{error.name} is not installed, which this command needs; give {extra}") from None
+        except OSError as error:
+            raise Refusal(plain(f"the operating system refuses ({error})")) from None
         except click.ClickException as error:
             error.message = plain(error.message)  # type: ignore[misc]
             raise

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import re
 import socket
@@ -22,6 +23,7 @@ _HOST = sha256(socket.gethostname().encode()).hexdigest()[:8]
 _PARTIAL = re.compile(rf"\.partial-{_HOST}-(\d+)-\d+(\..*)?")
 _numbers = count()
 _partials: set[Path] = set()
+_journal: Path | None = None
 _protected_too: ContextVar[bool] = ContextVar("_protected_too", default=False)
 
 
@@ -198,6 +200,19 @@ def partial_file(folder: Path, suffix: str) -> Iterator[Path]:
         yield path
 
 
+def keep_journal(journal: Path) -> None:
+    """Let :func:`write_whole` note in a file, from now on, what it is about to put in which place."""
+    global _journal
+    _journal = journal
+
+
+def note(journal: Path, contents: Mapping[Path, Path]) -> None:
+    """Add to a journal a line for each place: its path, and the SHA-256 of the file with what is to stand there."""
+    lines = [json.dumps([str(path), sha256(file.read_bytes()).hexdigest()]) + "\n" for path, file in contents.items()]
+    with journal.open("a", encoding="utf-8") as opened:
+        opened.writelines(lines)
+
+
 def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterable[Path] = ()) -> None:
     """Write several files so that either all of them appear, whole, or none does.
 
@@ -229,6 +244,8 @@ def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterab
                 with partials[target].open("rb+") as whole:  # a power cut must not leave a name without its contents
                     os.fsync(whole.fileno())
                 partials[target].chmod(0o666 & ~_umask())
+            if _journal is not None:
+                note(_journal, partials)
             with undisturbed:
                 for target, partial in partials.items():
                     partial.replace(goals[target])

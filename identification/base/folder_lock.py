@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from stat import S_ISREG
 
 from identification.base.errors import InputError
 from identification.base.files import is_folder, is_there, removed_at_the_end
+
+OURS = re.compile(rb"(\d+(\n([^\n]*\n?)?)?)?")  # what a lock holds, half-written too: a process and its host
 
 
 @contextmanager
@@ -32,7 +36,7 @@ def locked_folder(folder: Path) -> Iterator[None]:
     except OSError as error:
         raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
     try:
-        with _held(folder / ".lock", folder):
+        with _held(folder / ".antiwindup.lock", folder):
             yield
     finally:
         with suppress(OSError):
@@ -68,6 +72,7 @@ def _held(lock: Path, target: Path) -> Iterator[None]:
 
     if not is_folder(lock.parent):
         raise InputError(f"{target.parent}: no such folder")
+    _require_ours(lock)
     holder = FileLock(lock, timeout=0)
     try:
         holder.acquire()
@@ -84,6 +89,15 @@ def _held(lock: Path, target: Path) -> Iterator[None]:
             yield
     finally:
         holder.release()
+
+
+def _require_ours(lock: Path) -> None:
+    """Refuse a file in the place of a lock that no command has left there."""
+    try:
+        if os.path.lexists(lock) and not (S_ISREG(lock.lstat().st_mode) and OURS.fullmatch(lock.read_bytes())):
+            raise InputError(f"{lock}: is no lock of this project; expected no such file")
+    except OSError as error:
+        raise InputError(f"{lock}: cannot be read ({error.strerror})") from None
 
 
 def _holder(lock: Path) -> str:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
 from identification.base.errors import InputError, MissingFile, shown
-from identification.base.files import read_bytes, write_whole
+from identification.base.files import read_bytes, read_text, write_whole
 from identification.base.json_object import member, read_json, record
 
 NAME = "manifest.json"
@@ -41,10 +42,12 @@ def read_manifest(folder: Path) -> dict[str, Written]:
         The manifest cannot be read or is not one.
     """
     path = folder / NAME
+    if os.path.islink(path):  # noqa: PTH114
+        raise InputError(f"{path}: is a link; expected a file that this project wrote, or none")
     try:
         files = member(read_json(path, SCHEMA), "files")
         for name in files:
-            if Path(name).is_absolute() or ".." in Path(name).parts:
+            if not name.isprintable() or not Path(name).parts or Path(name).is_absolute() or ".." in Path(name).parts:
                 raise InputError(f"{shown(name)} leads out of the folder; expected the name of a file in it")
         return {name: record(Written, member(files, name)) for name in files}
     except MissingFile:
@@ -62,6 +65,30 @@ def write_manifest(folder: Path, files: Mapping[str, Written]) -> None:
     return write_whole(
         {path: lambda partial: partial.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")}
     )
+
+
+def read_journal(path: Path) -> dict[str, set[str]]:
+    """Return what :func:`identification.base.files.note` kept: path -> hashes; a last line that is cut counts for none.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read or is no journal.
+    """
+    found: dict[str, set[str]] = {}
+    try:
+        lines = read_text(path).split("\n")[:-1]
+    except MissingFile:
+        return {}
+    for number, line in enumerate(lines, 1):
+        try:
+            name, content = json.loads(line)
+            found.setdefault(str(name), set()).add(str(content))
+        except (ValueError, TypeError):
+            raise InputError(
+                f"{path}, line {number}: is no path with a hash; expected the journal of a build"
+            ) from None
+    return found
 
 
 def content_of(path: Path) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -113,6 +114,23 @@ def test_a_command_line_has_each_value_in_a_word_of_its_own(tmp_path: Path) -> N
     assert arguments("figures", {"OUTPUT": "b", "ONLY": "fig_2_01 fig_2_02", "FORCE": "yes"})[2:-1] == [
         *("--only=fig_2_01", "--only=fig_2_02", "--force")
     ]
+
+
+@pytest.mark.parametrize(
+    ("variables", "part"),
+    [
+        ({"FORCE": "no"}, "FORCE is 'no'; expected yes or nothing"),
+        ({"REPORT": "0"}, "REPORT is '0'; expected yes or nothing"),
+        ({"FIT": "--output elsewhere"}, "FIT is '--output elsewhere': No such option"),
+        ({"FIT": "--force"}, "No such option"),
+        ({"FIT": "a.csv"}, "unexpected extra argument"),
+        ({"FIT": "--modes 99"}, "FIT is '--modes 99': "),
+        ({"FIT": "'"}, "No closing quotation"),
+    ],
+)
+def test_a_variable_holds_what_it_is_for_and_nothing_else(variables: dict[str, str], part: str) -> None:
+    with pytest.raises(InputError, match=re.escape(part)):
+        arguments("refit", {"OUTPUT": "mine", "SWEEPS": "a.csv"} | variables)
 
 
 @given(st.lists(st.text("ab '\"\\$`", min_size=1), min_size=1, max_size=3))

@@ -19,6 +19,7 @@ from antiwindup.__main__ import main as antiwindup_command
 from antiwindup.build import Build, Crash
 from antiwindup.steps import Asked, Step, refit_steps, report_steps, thesis_steps
 from identification.base.errors import InputError
+from identification.base.files import note
 from identification.base.folder_lock import locked_folder
 
 EXTENDED = {
@@ -44,7 +45,7 @@ Refit = Callable[..., Build]
 class StandIn:
     """An ended process: it wrote its own name and what it read, as the command would; or refused, or crashed."""
 
-    def __init__(self, step: Step, log: Path, behaves: str) -> None:
+    def __init__(self, step: Step, log: Path, journal: Path, behaves: str) -> None:
         self.sentinel, writing = os.pipe()
         os.close(writing)
         self.exitcode = {"crashes": 1, "refuses": 2}.get(behaves, 0)
@@ -53,6 +54,7 @@ class StandIn:
         read = "".join(path.read_text(encoding="utf-8") for path in (*step.needs, *step.uses) if path.is_file())
         for path in step.outputs if not behaves else ():
             path.write_text(f"{step.name} {sha256(read.encode()).hexdigest()}\n", encoding="utf-8")
+            note(journal, {path: path})
 
     def terminate(self) -> None:
         pass
@@ -80,9 +82,9 @@ def refit(
     """Build ``tmp_path / "mine"`` from the sweep a.csv, or from others."""
     steps: list[Step] = []
 
-    def start(command: Sequence[str], log: Path) -> StandIn:
+    def start(command: Sequence[str], log: Path, journal: Path) -> StandIn:
         (step,) = [step for step in steps if step.command == command]
-        return StandIn(step, log, behaviour.get(step.name, ""))
+        return StandIn(step, log, journal, behaviour.get(step.name, ""))
 
     monkeypatch.setattr(antiwindup.build, "start", start)
     monkeypatch.setattr(
@@ -90,13 +92,19 @@ def refit(
     )
     (tmp_path / "a.csv").write_text("a", encoding="utf-8")
 
-    def run(goal: str = "refit", force: bool = False, only: Sequence[str] = (), **changes: object) -> Build:
+    def run(
+        goal: str = "refit",
+        force: bool = False,
+        only: Sequence[str] = (),
+        inputs: Sequence[Path] = (),
+        **changes: object,
+    ) -> Build:
         asked = Asked(tmp_path / "mine", None, (), (tmp_path / "a.csv",))
         asked = replace(asked, **changes)  # type: ignore[arg-type]
         first = refit_steps(asked) if goal == "refit" else thesis_steps(asked)
         steps[:] = [*first, *report_steps(asked, first)]
         wanted = [step for step in steps if step.name in only] or (steps if goal == "report" else first)
-        build = Build(asked.folder, steps, wanted, goes_on=goal == "refit", jobs=4, force=force)
+        build = Build(asked.folder, steps, inputs or asked.sweep_files, wanted, goal == "refit", 4, force)
         told: list[int] = []
         build.run(lambda ended, running: told.append(ended))
         assert told == list(range(1, len(told) + 1))
@@ -260,7 +268,7 @@ def test_a_file_that_was_changed_is_refused_and_outlives_every_build(
     asked = Asked(tmp_path / "mine", None, (), (tmp_path / "a.csv",))
     (tmp_path / "mine" / "figures" / "fig_4_01.pdf").write_text("also", encoding="utf-8")
     fit = refit_steps(asked)[:1]
-    Build(asked.folder, fit, fit, goes_on=True, jobs=1).run(lambda *_: None)  # a build without tables
+    Build(asked.folder, fit, [], fit, goes_on=True, jobs=1).run(lambda *_: None)  # a build without tables
     assert table.read_text(encoding="utf-8") == "corrected by hand"
     assert "figures/fig_4_01.pdf" in built(tmp_path)
     assert "results/extended_summary.csv" not in built(tmp_path)
@@ -304,6 +312,82 @@ def test_a_file_in_the_place_of_a_folder_is_refused_before_anything_is_done(refi
     with pytest.raises(InputError, match="results: no such folder"):
         refit()
     assert built(tmp_path) == {"results": "mine"}
+
+
+def test_what_a_killed_build_had_begun_is_replaced_if_it_is_ours(refit: Refit, tmp_path: Path) -> None:
+    refit()
+    mine, ours = tmp_path / "mine", built(tmp_path)
+    listed = json.loads((mine / "manifest.json").read_text(encoding="utf-8"))
+    for name in ("model.json", "design_extended.json"):
+        listed["files"][name]["content"] = None
+    (mine / "manifest.json").write_text(json.dumps(listed), encoding="utf-8")
+    note(mine / ".antiwindup.journal", {mine / name: mine / name for name in ("model.json", "design_extended.json")})
+    with (mine / ".antiwindup.journal").open("a", encoding="utf-8") as journal:
+        journal.write('["cut off by the ki')
+    (mine / "design_extended.json").write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match=r"design_extended\.json: is there already, written by somebody else"):
+        refit()
+    assert built(tmp_path)["design_extended.json"] == "mine"
+    (mine / "design_extended.json").unlink()
+    assert {"fit", "design extended"} <= set(refit().printed)
+    assert built(tmp_path) == ours
+
+
+@pytest.mark.parametrize("name", ["model.json", "responses.npz"])
+def test_an_input_that_is_an_output_is_refused(refit: Refit, tmp_path: Path, name: str) -> None:
+    refit()
+    before = built(tmp_path)
+    with pytest.raises(InputError, match=rf"{name}: is an output in .* too; expected another folder"):
+        refit("figures", inputs=[tmp_path / "mine" / name], model=str(tmp_path / "mine" / "model.json"))
+    assert built(tmp_path) == before
+
+
+def test_a_link_in_the_place_of_an_output_is_not_followed(refit: Refit, tmp_path: Path) -> None:
+    refit()
+    figure, own = tmp_path / "mine" / "figures" / "fig_4_01.pdf", tmp_path / "own.pdf"
+    figure.rename(own)
+    for target in (own, tmp_path / "nowhere"):
+        figure.unlink(missing_ok=True)
+        figure.symlink_to(target)
+        (tmp_path / "a.csv").write_text("b", encoding="utf-8")
+        before = own.read_bytes()
+        with pytest.raises(InputError, match=r"fig_4_01\.pdf: is there already"):
+            refit()
+        assert own.read_bytes() == before
+        assert not (tmp_path / "nowhere").exists()
+
+
+def test_a_file_that_cannot_be_removed_stays_ours(
+    refit: Refit, behaviour: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refit()
+    everything = built(tmp_path)
+    unlink = Path.unlink
+
+    def barred(path: Path, missing_ok: bool = False) -> None:
+        if path.name == "fig_4_01.svg":
+            raise PermissionError(13, "Permission denied")
+        unlink(path, missing_ok)
+
+    behaviour["design extended"] = "refuses"
+    (tmp_path / "a.csv").write_text("b", encoding="utf-8")
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", barred)
+        with pytest.raises(InputError, match=r"fig_4_01\.svg: cannot be removed \(Permission denied\)"):
+            refit()
+    behaviour.clear()
+    (tmp_path / "a.csv").write_text("a", encoding="utf-8")
+    refit()
+    assert built(tmp_path) == everything
+
+
+def test_nothing_of_another_model_stays_beside_what_was_asked_for(refit: Refit, tmp_path: Path) -> None:
+    refit("figures", model="implied", only=["fig_2_10", "fig_4_01"])
+    refit("figures", model="table", limit=7.0, only=["fig_2_10"])
+    assert not {"figures/fig_4_01.pdf", "results/extended.csv"} & set(built(tmp_path))
+    assert {"figures/fig_2_10.pdf", "design_extended.json"} <= set(built(tmp_path))
+    refit("figures", model="implied", only=["fig_2_01"])
+    assert set(built(tmp_path)) == {f"figures/fig_2_01.{kind}" for kind in ("pdf", "svg", "png", "txt")}
 
 
 def test_two_builds_of_one_folder(refit: Refit, tmp_path: Path) -> None:
