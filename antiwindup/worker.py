@@ -56,7 +56,8 @@ def start(command: Sequence[str], log: Path, journal: Path) -> BaseProcess:
         with undisturbed:
             process.start()
     except (EOFError, OSError) as error:
-        raise InputError(f"no process can be started ({error or 'the first one ended'})") from None
+        wanted = "packages that load in this folder, and the files and the memory that they need"
+        raise InputError(f"no process can be started ({error}); expected {wanted}") from None
     return process
 
 

@@ -39,7 +39,7 @@ def begin() -> None:
         if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, end)
     os.environ.update(dict.fromkeys(THREADS, "1"))
-    os.environ.update(MPLBACKEND="agg", MATPLOTLIBRC=os.devnull)  # figures have a style of their own, and no window
+    os.environ["MPLBACKEND"] = "agg"  # no figure has a window
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
         os.environ.setdefault("PYTHONWARNINGS", "ignore")  # of the processes that it begins

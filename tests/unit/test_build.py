@@ -443,8 +443,9 @@ def test_a_build_draws_and_draws_nothing_twice(tmp_path: Path) -> None:
     output = tmp_path / os.fsdecode(b"my '$(folder)' \xff")
     drawn = ["figures", str(SWEEP), "--model", "implied", "--only", "fig_2_01", "--output", str(output)]
     command = [sys.executable, "-m", "antiwindup", *drawn]
+    jupyter = os.environ | {"MPLBACKEND": "module://matplotlib_inline.backend_inline"}
     for steps in (1, 0):
-        done = subprocess.run(command, cwd=SWEEP.parents[2], capture_output=True, check=False)
+        done = subprocess.run(command, cwd=SWEEP.parents[2], env=jupyter, capture_output=True, check=False)
         assert done.returncode == 0, done.stderr
         assert done.stderr == b""
         assert done.stdout.startswith(f"{steps} steps were run, 0 refused -> ".encode())
