@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from identification.base.errors import InputError
-from identification.base.files import is_file, note, require_folder, require_replaceable, true_path
+from identification.base.files import is_file, note, noted_name, require_folder, require_replaceable, true_path
 from identification.base.manifest import Written, content_of, read_journal, read_manifest, write_manifest
 
 JOURNAL = ".antiwindup.journal"
@@ -42,7 +42,7 @@ class OutputFolder:
             if written.content is None:
                 content = None if os.path.islink(path / name) else self.content(path / name)  # noqa: PTH114
                 del self.written[name]
-                if content in noted.get(str(path / name), set()):
+                if content in noted.get(noted_name(self.journal, path / name), set()):
                     self.written[name] = Written("", content)
 
     def name(self, path: Path) -> str:

@@ -207,10 +207,15 @@ def keep_journal(journal: Path) -> None:
 
 
 def note(journal: Path, contents: Mapping[Path, Path]) -> None:
-    """Add to a journal a line for each place: its path, and the SHA-256 of the file with what is to stand there."""
-    lines = [json.dumps([str(path), sha256(file.read_bytes()).hexdigest()]) + "\n" for path, file in contents.items()]
+    """Add to a journal a line for each place: its name, and the SHA-256 of the file with what is to stand there."""
+    lines = [[noted_name(journal, path), sha256(file.read_bytes()).hexdigest()] for path, file in contents.items()]
     with journal.open("a", encoding="utf-8") as opened:
-        opened.writelines(lines)
+        opened.writelines(json.dumps(line) + "\n" for line in lines)
+
+
+def noted_name(journal: Path, path: Path) -> str:
+    """The name of a place in a journal, the same however it is spelled and wherever their folder is moved."""
+    return os.path.relpath(true_path(path.parent) / path.name, true_path(journal.parent))
 
 
 def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterable[Path] = ()) -> None:

@@ -68,7 +68,7 @@ def write_manifest(folder: Path, files: Mapping[str, Written]) -> None:
 
 
 def read_journal(path: Path) -> dict[str, set[str]]:
-    """Return what :func:`identification.base.files.note` kept: path -> hashes; a last line that is cut counts for none.
+    """Return what :func:`identification.base.files.note` kept: name of a place -> hashes. A line cut off is none.
 
     Raises
     ------

@@ -329,6 +329,9 @@ def test_what_a_killed_build_had_begun_is_replaced_if_it_is_ours(refit: Refit, t
         refit()
     assert built(tmp_path)["design_extended.json"] == "mine"
     (mine / "design_extended.json").unlink()
+    moved = tmp_path / "moved"
+    mine.rename(moved)
+    mine.symlink_to(moved)
     assert {"fit", "design extended"} <= set(refit().printed)
     assert built(tmp_path) == ours
 
