@@ -18,7 +18,7 @@ from antiwindup.output_folder import OutputFolder
 from antiwindup.steps import Step
 from antiwindup.worker import start
 from identification.base.errors import InputError
-from identification.base.files import is_folder, partial_file, write_whole
+from identification.base.files import is_folder, note, partial_file, write_whole
 from identification.base.folder_lock import locked_folder
 
 REFUSED, USAGE = "Error: ", "Usage: "
@@ -103,6 +103,7 @@ class Build:
             self._folder = OutputFolder(self.path)
             places = [path for step in self.steps for path in (*step.outputs, step.refusal)]
             self._folder.require_no_input(self.inputs, places)
+            self._seen = {path: _signature(path) for path in self.inputs}
             if not self.force:
                 self._folder.require_free(places)
             self._folder.remove({self.path / name for name in self._folder.written} - {*places})
@@ -152,6 +153,8 @@ class Build:
             return True
         if folder.holds(source := self._source(step), step.outputs):
             return True
+        if not self.force:
+            folder.require_free(step.outputs)  # as they are by now
         folder.begin(source, step.outputs)
         for path in step.outputs:
             if self.force and not is_folder(path):  # which the command refuses
@@ -169,6 +172,10 @@ class Build:
         ended.process.join()
         said = ended.log.read_text(encoding="utf-8", errors="replace")
         ended.closing.close()
+        for path, seen in self._seen.items():
+            if _signature(path) != seen:
+                self._remove(self._after([step]))
+                raise InputError(f"{path}: was changed while the build ran; give the same command again")
         if ended.process.exitcode == 0 and all(folder.content(path) for path in step.outputs):
             folder.end(step.outputs)
             folder.remove([step.refusal])
@@ -194,6 +201,7 @@ class Build:
         self.refused[step.name] = sentence
         folder.begin(ended.source, [step.refusal])
         write_whole({step.refusal: lambda path: path.write_text(f"{sentence}\n", encoding="utf-8")})
+        note(folder.journal, {step.refusal: step.refusal})
         folder.end([step.refusal])
         return step
 
@@ -213,3 +221,12 @@ class Build:
                 found.append(step)
                 written |= {*step.outputs, step.refusal}
         return found
+
+
+def _signature(path: Path) -> tuple[int, int, int] | None:
+    """By which a file is known to be the same as a while ago."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_size, found.st_mtime_ns

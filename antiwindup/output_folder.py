@@ -58,9 +58,12 @@ class OutputFolder:
     def require_free(self, paths: Sequence[Path]) -> None:
         """Refuse, with an InputError, places of outputs that hold what the project did not write or may not replace."""
         for folder in {path.parent for path in paths}:
+            if folder != self.path and folder.is_symlink():
+                raise InputError(f"{folder}: is a link; expected a folder for the outputs, or none")
             if os.path.lexists(folder):
                 require_folder(folder)
         for path in paths:
+            self._contents.pop(path, None)
             written = self.written.get(self.name(path))
             if os.path.lexists(path) and (written is None or path.is_symlink()):
                 raise InputError(
@@ -109,10 +112,12 @@ class OutputFolder:
         InputError
             A file may not be removed.
         """
+        noted = read_journal(self.journal)
         for path in paths:
             written = self.written.get(self.name(path))
+            ours = noted.get(noted_name(self.journal, path), set()) if written and not written.content else set()
             try:
-                if written and not path.is_symlink() and written.content in (None, content_of(path)):
+                if written and is_file(path) and not path.is_symlink() and content_of(path) in {written.content, *ours}:
                     path.unlink(missing_ok=True)
             except OSError as error:
                 raise InputError(f"{path}: cannot be removed ({error.strerror})") from None

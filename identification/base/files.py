@@ -209,8 +209,11 @@ def keep_journal(journal: Path) -> None:
 def note(journal: Path, contents: Mapping[Path, Path]) -> None:
     """Add to a journal a line for each place: its name, and the SHA-256 of the file with what is to stand there."""
     lines = [[noted_name(journal, path), sha256(file.read_bytes()).hexdigest()] for path, file in contents.items()]
-    with journal.open("a", encoding="utf-8") as opened:
-        opened.writelines(json.dumps(line) + "\n" for line in lines)
+    opened = os.open(journal, os.O_WRONLY | os.O_APPEND | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+    with os.fdopen(opened, "a", encoding="utf-8") as stream:  # a line that was cut off before ends here
+        stream.writelines(f"\n{json.dumps(line)}\n" for line in lines)
+        stream.flush()
+        os.fsync(opened)
 
 
 def noted_name(journal: Path, path: Path) -> str:
@@ -281,7 +284,7 @@ def require_replaceable(path: Path) -> None:
 def _remove_abandoned(folder: Path) -> None:
     """Remove what a process of this machine, which is no more, had begun to write in a folder."""
     for path in folder.glob(".partial-*"):
-        if (found := _PARTIAL.fullmatch(path.name)) and not _runs(int(found[1])):
+        if (found := _PARTIAL.fullmatch(path.name)) and not _runs(int(found[1])) and S_ISREG(path.lstat().st_mode):
             path.unlink(missing_ok=True)
 
 

@@ -94,8 +94,13 @@ def _held(lock: Path, target: Path) -> Iterator[None]:
 def _require_ours(lock: Path) -> None:
     """Refuse a file in the place of a lock that no command has left there."""
     try:
-        if os.path.lexists(lock) and not (S_ISREG(lock.lstat().st_mode) and OURS.fullmatch(lock.read_bytes())):
+        if not os.path.lexists(lock):
+            return
+        found = lock.lstat()
+        if not (S_ISREG(found.st_mode) and found.st_nlink == 1 and OURS.fullmatch(lock.read_bytes())):
             raise InputError(f"{lock}: is no lock of this project; expected no such file")
+    except FileNotFoundError:  # which its holder has just removed
+        return
     except OSError as error:
         raise InputError(f"{lock}: cannot be read ({error.strerror})") from None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
@@ -15,6 +16,7 @@ from identification.base.json_object import member, read_json, record
 
 NAME = "manifest.json"
 SCHEMA = 1
+NOTED = re.compile(r'\[("(?:[^"\\]|\\.)*"), "([0-9a-f]{64})"\]')  # a line of a journal
 
 
 @dataclass(frozen=True)
@@ -76,18 +78,15 @@ def read_journal(path: Path) -> dict[str, set[str]]:
         The file cannot be read or is no journal.
     """
     found: dict[str, set[str]] = {}
-    try:
-        lines = read_text(path).split("\n")[:-1]
-    except MissingFile:
-        return {}
-    for number, line in enumerate(lines, 1):
-        try:
-            name, content = json.loads(line)
-            found.setdefault(str(name), set()).add(str(content))
-        except (ValueError, TypeError):
-            raise InputError(
-                f"{path}, line {number}: is no path with a hash; expected the journal of a build"
-            ) from None
+    if not os.path.lexists(path):
+        return found
+    if os.path.islink(path) or path.lstat().st_nlink != 1:  # noqa: PTH114
+        raise InputError(f"{path}: is a link; expected the journal of a build, or no such file")
+    for number, line in enumerate(read_text(path).split("\n"), 1):
+        if noted := NOTED.fullmatch(line):
+            found.setdefault(json.loads(noted[1]), set()).add(noted[2])
+        elif line and not line.startswith('["'):
+            raise InputError(f"{path}, line {number}: no path with a hash; expected the journal of a build")
     return found
 
 

@@ -393,6 +393,70 @@ def test_nothing_of_another_model_stays_beside_what_was_asked_for(refit: Refit, 
     assert set(built(tmp_path)) == {f"figures/fig_2_01.{kind}" for kind in ("pdf", "svg", "png", "txt")}
 
 
+def precious(path: Path) -> None:
+    path.write_text("precious notes", encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        precious,
+        lambda path: path.write_text('{"a": 1, "b": 2}\n', encoding="utf-8"),
+        lambda path: path.write_text("[" * 100_000, encoding="utf-8"),
+        lambda path: path.symlink_to(path.parent.parent / "a.csv"),
+        lambda path: path.hardlink_to(path.parent.parent / "a.csv"),
+        lambda path: path.mkdir(),
+    ],
+)
+def test_what_is_no_journal_is_refused_and_left(refit: Refit, tmp_path: Path, make: Callable[[Path], object]) -> None:
+    journal = tmp_path / "mine" / ".antiwindup.journal"
+    journal.parent.mkdir()
+    make(journal)
+    before = journal.lstat()
+    with pytest.raises(InputError, match=r"\.antiwindup\.journal"):
+        refit()
+    assert (journal.lstat().st_ino, journal.lstat().st_size) == (before.st_ino, before.st_size)
+    assert (tmp_path / "a.csv").read_text(encoding="utf-8") == "a"
+
+
+def test_what_somebody_puts_into_a_place_while_a_build_runs_is_refused_and_left(
+    refit: Refit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figure = tmp_path / "mine" / "figures" / "fig_4_01.pdf"
+
+    def code_of(command: Sequence[str]) -> str:
+        if "campaign-tables" in command and not figure.exists():
+            figure.parent.mkdir(exist_ok=True)
+            precious(figure)
+        return ""
+
+    monkeypatch.setattr(antiwindup.build, "code_of", code_of)
+    with pytest.raises(InputError, match=r"fig_4_01\.pdf: is there already"):
+        refit()
+    assert figure.read_text(encoding="utf-8") == "precious notes"
+
+
+def test_an_input_that_changes_while_a_build_runs_is_noticed(
+    refit: Refit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sweep = tmp_path / "a.csv"
+
+    def code_of(command: Sequence[str]) -> str:
+        if "extended" in command and sweep.read_text(encoding="utf-8") == "a":
+            sweep.write_text("bb", encoding="utf-8")
+        return ""
+
+    with monkeypatch.context() as patch:
+        patch.setattr(antiwindup.build, "code_of", code_of)
+        with pytest.raises(InputError, match=r"a\.csv: was changed while the build ran; give the same command again"):
+            refit()
+    refit()
+    changed = built(tmp_path)
+    sweep.write_text("a", encoding="utf-8")
+    assert "fit" in refit().printed
+    assert built(tmp_path)["model.json"] != changed["model.json"]
+
+
 def test_two_builds_of_one_folder(refit: Refit, tmp_path: Path) -> None:
     with locked_folder(tmp_path / "mine"), pytest.raises(InputError, match=r"process \d+ on"):
         refit()
