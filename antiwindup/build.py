@@ -136,14 +136,10 @@ class Build:
                 if self._settled(step := waiting.pop(0)):
                     ended.append(step)
             if not ended:
-                ended = [self._settle(self._running.pop(number)) for number in self._ready()]
+                ended = [self._settle(self._running.pop(number)) for number in wait(list(self._running))]  # type: ignore[arg-type]
             for step in ended:
                 sorter.done(step)
                 yield step
-
-    def _ready(self) -> list[int]:
-        """The numbers of running steps that have ended, once there is one."""
-        return [int(str(number)) for number in wait(list(self._running))]
 
     def _settled(self, step: Step) -> bool:
         """Whether nothing is to be done for a step; if something is, it is started."""
