@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import gc
 import re
-import sys
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -72,7 +71,7 @@ class CommandGroup(Console):
         try:
             with np.errstate(over="raise"), warnings.catch_warnings(record=True) as held:  # a refusal is one sentence
                 result = super().invoke(ctx)
-            for each in held if sys.warnoptions else ():
+            for each in held:
                 warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
             return result
         except InputError as error:

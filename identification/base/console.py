@@ -46,6 +46,7 @@ class Console(click.Group):
                 error.show()
         _print(printable_lines(printed.getvalue()))
         _flush_errors(status)
+        process.done()
         sys.exit(status)
 
 

@@ -90,6 +90,12 @@ def _loaded(module: str, function: str, otherwise: Callable[[], Any]) -> Callabl
     return found
 
 
+def done() -> None:
+    """Take no more signals: the work is done and said, and Python, as it ends, would be killed as if it were not."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
 def leave_signals_to_parent() -> None:
     """In a process that a command began: leave to the command what a terminal sends to both; SIGTERM ends this one."""
     for number in SIGNALS:
