@@ -39,9 +39,8 @@ def files_of_command(command: Sequence[str]) -> list[str]:
     owner, name = ("experiments/thesis", words[1]) if words[0] == "thesis" else (room, words[0])
     found = [
         file
-        for path in sorted((ROOT / owner).rglob("*.py"))
-        if name in read(file := path.relative_to(ROOT).as_posix())[1]
-        and (owner != "experiments" or not file.startswith("experiments/thesis/"))
+        for file in _modules(owner)
+        if name in read(file)[1] and (owner != "experiments" or not file.startswith("experiments/thesis/"))
     ]
     needed = [*files_of(f"{room}.__main__"), *found, *(each for file in found for each in read(file)[1][name])]
     if name == "draw":
@@ -124,6 +123,12 @@ def closure(files: Iterable[str]) -> list[str]:
             met.add(file)
             left += read(file)[0]
     return sorted(met)
+
+
+@cache
+def _modules(folder: str) -> tuple[str, ...]:
+    """The modules below a folder of the project."""
+    return tuple(sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / folder).rglob("*.py")))
 
 
 @cache

@@ -18,7 +18,7 @@ import click
 from experiments.campaign.run_plants import CHUNK, Campaign, Columns
 from experiments.campaign.seal import SEAL, Seal
 from identification.base.errors import InputError
-from identification.base.files import read_bytes, read_text, require_replaceable, write_whole
+from identification.base.files import read_bytes, read_text, require_writable, write_whole
 
 MANIFEST = "manifest.json"
 PARTIAL = ".partial-"  # of a command that was killed while it wrote
@@ -79,9 +79,7 @@ class CampaignFile:
             "design": source.name,
             "version": str(version(PACKAGES[0])),
         }
-        if os.path.realpath(output) == os.path.realpath(source):
-            raise InputError(f"{output}: is an input too; expected another file to write")
-        require_replaceable(output)
+        require_writable(output, inputs=[source])
         self._parts: dict[int, Path] = {}
         if self.folder.exists():
             self._claim_folder(anew)
