@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from identification.__main__ import fit_options
+from identification.__main__ import fit_options, reading_options
 from identification.base.command_line import together
 from identification.base.errors import InputError, shown
 from identification.base.files import require_readable, true_path
@@ -33,6 +33,7 @@ build_options = together(
     ),
     click.option("--jobs", type=click.IntRange(1), help="How many steps run at once; one a processor unless given."),
     click.option("--force", is_flag=True, help="Replace what stands in the place of an output, whoever wrote it."),
+    reading_options,
     fit_options,
 )
 """What every build takes."""
@@ -112,7 +113,7 @@ def _asked(
             raise InputError(f"{shown(name)}: holds a line break; expected a name of one line")
     source = click.get_current_context().get_parameter_source
     given = {name: value for name, value in fit.items() if source(name) == ParameterSource.COMMANDLINE}
-    words = [word for name, value in given.items() for word in (f"--{name.replace('_', '-')}", _word(value))]
+    words = [word for name, value in given.items() for word in _words(name, value)]
     asked = Asked(Path(output), model, sweeps, tuple(input_files(sweeps)), tuple(words), limit, plants)
     for path in asked.sweep_files:
         require_readable(path)
@@ -121,11 +122,16 @@ def _asked(
     return asked, {"jobs": jobs or os.cpu_count() or 1, "force": force}
 
 
-def _word(value: object) -> str:
-    """A value of an option of the fit as a command line has it: auto, numbers of zeros and poles, or as it is."""
-    if value is None:
-        return "auto"
-    return "/".join(map(str, value)) if isinstance(value, tuple) else str(value)
+def _words(name: str, value: object) -> list[str]:
+    """An option of the fit as a command line has it: a flag, auto, counts of zeros and poles, pairs, or as it is."""
+    option = f"--{name.replace('_', '-')}"
+    if isinstance(value, bool):
+        return [option] if value else []
+    if isinstance(value, dict):
+        return [option, ",".join(f"{theirs}={ours}" for theirs, ours in value.items())]
+    if isinstance(value, tuple):
+        return [option, "/".join(map(str, value))]
+    return [option, "auto" if value is None else str(value)]
 
 
 def _build(asked: Asked, steps: Sequence[Step], wanted: Sequence[Step], goes_on: bool, jobs: int, force: bool) -> None:

@@ -18,7 +18,7 @@ from collections.abc import Mapping
 import click
 
 from antiwindup.__main__ import main
-from identification.__main__ import fit_options
+from identification.__main__ import fit_options, reading_options
 from identification.base.command_line import Refusal
 from identification.base.errors import InputError, shown
 
@@ -58,6 +58,7 @@ def arguments(build: str, variables: Mapping[str, str]) -> list[str]:
 
 
 @click.command(add_help_option=False)
+@reading_options
 @fit_options
 def only_fit(**_options: object) -> None:
     """What FIT may hold."""

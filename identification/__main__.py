@@ -12,6 +12,7 @@ if __name__ == "__main__":
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -38,9 +39,39 @@ class Counts(click.ParamType):  # type: ignore[type-arg]  # generic in the newes
         return int(words[0]), int(words[1])
 
 
+class Columns(click.ParamType):  # type: ignore[type-arg]  # as above
+    """Pairs such as ``Frequency (Hz)=frequency_hz`` with commas between."""
+
+    name = "columns"
+
+    def convert(
+        self, value: str | dict[str, str], param: click.Parameter | None, ctx: click.Context | None
+    ) -> dict[str, str]:
+        if isinstance(value, dict):
+            return value
+        pairs = [pair.rpartition("=") for pair in value.split(",")]
+        if not all(name.strip() and ours.strip() for name, _, ours in pairs):
+            self.fail(f"'{value}' holds no pairs; expected NAME=OURS, with commas between several", param, ctx)
+        return {name.strip(): ours.strip() for name, _, ours in pairs}
+
+
 @click.group(cls=CommandGroup)
 def main() -> None:
     """From sine sweeps to a plant model with its uncertainty."""
+
+
+reading_options = together(
+    click.option(
+        "--columns",
+        type=Columns(),
+        metavar="NAME=OURS,...",
+        help='What a file calls a column and we do, such as "Frequency (Hz)=frequency_hz".',
+    ),
+    click.option("--node", type=int, help="Of the response, in a universal file of several."),
+    click.option("--direction", type=int, help="Of the response, in a universal file of several."),
+    click.option("--resample", is_flag=True, help="Bring records with uneven time stamps to an even grid."),
+)
+"""What a file of sweeps does not say itself; the values are those of ``Reading``."""
 
 
 fit_options = together(
@@ -84,6 +115,7 @@ fit_options = together(
     type=OUTPUT_FILE,
     help="Keep the responses in this .npz, to be given as a SWEEP later.",
 )
+@reading_options
 @fit_options
 def fit(
     sweeps: tuple[Path, ...],
@@ -95,11 +127,13 @@ def fit(
     bound_order: int,
     seed: int,
     responses: Path | None,
+    **reading: Any,
 ) -> None:
     """Fit gain, integrators, modes, real roots and dead time to SWEEP files (raw records or frequency responses)."""
     from tqdm import tqdm
 
     from identification.fit_model import fit_model
+    from identification.formats.reading import Reading
     from identification.model.structure import Wanted
     from identification.output.fit_facts import bound_remarks, bound_text, check_lines, table
     from identification.sweeps.kept_responses import write_responses
@@ -107,7 +141,7 @@ def fit(
 
     files = input_files(sweeps)
     require_writable(output, *([] if responses is None else [responses]), inputs=files)
-    tests = read_sweeps(sweeps)
+    tests = read_sweeps(sweeps, Reading(**{k: v for k, v in reading.items() if v is not None}))
     with tqdm(desc="fits", unit="", disable=None, leave=False) as bar:
         wanted = Wanted(None if integrators == "auto" else int(integrators), modes, real)
         soft = loss == "soft-l1"

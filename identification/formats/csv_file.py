@@ -14,12 +14,13 @@ import numpy as np
 from identification.base.errors import InputError
 from identification.base.files import read_text
 from identification.formats.columns import Table, choose_columns, quoted, split_tests
+from identification.formats.reading import Reading
 from identification.formats.sizes import require_size
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 
 
-def read_csv(path: Path) -> list[Table]:
+def read_csv(path: Path, reading: Reading) -> list[Table]:
     """Read the tests of a CSV of sweeps, see :func:`read_columns`."""
     return read_columns(path, lambda place, header: choose_columns(place, header, "columns", may_be_complex=False))
 

@@ -18,6 +18,7 @@ from identification.base.errors import InputError
 from identification.base.files import read_bytes
 from identification.formats.columns import COMPLEX, Table, choose_columns, quoted, split_tests
 from identification.formats.mat_structure import is_sound
+from identification.formats.reading import Reading
 from identification.formats.sizes import require_bytes, require_size
 
 NUMERIC = {"double", "single", "logical"} | {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)}
@@ -25,7 +26,7 @@ LABELS = NUMERIC | {"char", "cell"}
 NUMBER = 8  # bytes
 
 
-def read_mat(path: Path) -> list[Table]:
+def read_mat(path: Path, reading: Reading) -> list[Table]:
     """Read the tests of a MAT file of version 4 to 7: variables with the names of a CSV's columns, or ``response``.
 
     Frequency or time is a vector of N. The other columns are vectors of N, with ``test`` a vector of N labels for

@@ -14,6 +14,7 @@ from identification.base.arrays import Array, Whole
 from identification.base.errors import InputError
 from identification.base.files import read_bytes
 from identification.formats.columns import INPUTS, Table, quoted
+from identification.formats.reading import Reading
 from identification.formats.sizes import require_size
 
 FUNCTION = 58
@@ -25,7 +26,7 @@ POINT = ("rsp_node", "rsp_dir", "ref_node", "ref_dir")
 Function = Mapping[str, Any]  # what pyuff makes of a data set, with "number", its place in the file from 1
 
 
-def read_uff(path: Path) -> list[Table]:
+def read_uff(path: Path, reading: Reading) -> list[Table]:
     """Read the frequency responses (function type 4) or the records (type 1) of a universal file, each a test.
 
     A coherence (type 6) belongs to the frequency response of the same nodes and directions, the second one to the

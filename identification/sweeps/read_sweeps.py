@@ -13,6 +13,7 @@ from identification.base.files import is_folder, require_readable, true_path
 from identification.formats.columns import Table
 from identification.formats.csv_file import read_csv
 from identification.formats.mat_file import read_mat
+from identification.formats.reading import Reading
 from identification.formats.uff_file import read_uff
 from identification.sweeps.estimate_response import estimate_response
 from identification.sweeps.kept_responses import read_responses
@@ -51,8 +52,10 @@ def input_files(paths: Sequence[Path | str]) -> list[Path]:
     return files
 
 
-def read_sweeps(paths: Path | str | Sequence[Path | str]) -> list[FrequencyResponse]:
+def read_sweeps(paths: Path | str | Sequence[Path | str], reading: Reading | None = None) -> list[FrequencyResponse]:
     """Read the tests of a file, or of files and folders (see :func:`input_files`), in their order.
+
+    ``reading`` says what the files do not say themselves.
 
     A file that ends in .npz holds responses that were estimated before, see
     :mod:`identification.sweeps.kept_responses`; they keep their names and the paths that they came from. Every other
@@ -76,7 +79,7 @@ def read_sweeps(paths: Path | str | Sequence[Path | str]) -> list[FrequencyRespo
         if file.suffix.lower() == KEPT:
             tests += read_responses(file)
             continue
-        for table in READERS.get(file.suffix.lower(), read_csv)(file):
+        for table in READERS.get(file.suffix.lower(), read_csv)(file, reading or Reading()):
             label = name if table.test is None else f"{name}, test {table.test}"
             tests.append(_from_record(table, label) if "time_s" in table.columns else _from_response(table, label))
     return tests
