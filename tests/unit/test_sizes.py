@@ -24,6 +24,7 @@ from identification.fitting.likelihood import noise_levels
 from identification.formats import mat_structure, sizes
 from identification.formats.csv_file import read_csv
 from identification.formats.mat_file import read_mat
+from identification.formats.reading import Reading
 from identification.model.plant import Mode, PlantModel
 from identification.model.structure import Structure
 from identification.sweeps import estimate_response as module
@@ -128,7 +129,7 @@ def test_a_csv_takes_little_more_memory_than_its_text(tmp_path: Path) -> None:
     table = np.column_stack([test.omega, test.response.real, test.response.imag])
     np.savetxt(tmp_path / "many.csv", table, fmt="%.12g", delimiter=",", header="omega,real,imag", comments="")
     tracemalloc.start()
-    (found,) = read_csv(tmp_path / "many.csv")
+    (found,) = read_csv(tmp_path / "many.csv", Reading())
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 6 * (tmp_path / "many.csv").stat().st_size
@@ -200,7 +201,7 @@ def test_a_mat_file_is_asked_its_sizes_first(sentence: str, tmp_path: Path, monk
     path = tmp_path / "bomb.mat"
     path.write_bytes(b"".join([header, *whole, packed(BOMBS[sentence])]))
     with pytest.raises(InputError, match=sentence):
-        read_mat(path)
+        read_mat(path, Reading())
 
 
 def test_a_variable_that_is_not_read_may_be_large(tmp_path: Path) -> None:
@@ -208,7 +209,7 @@ def test_a_variable_that_is_not_read_may_be_large(tmp_path: Path) -> None:
     members = element(5, struct.pack("<i", 8)) + bytes(4) + element(1, b"a".ljust(8, b"\0")) + element(14, HUGE)
     whole = [packed(array(6, (19, 1), name, NUMBERS)) for name in (b"frequency_hz", b"real", b"imag")]
     (tmp_path / "mine.mat").write_bytes(b"".join([header, *whole, packed(array(2, (1, 1), b"mine", members))]))
-    (table,) = read_mat(tmp_path / "mine.mat")
+    (table,) = read_mat(tmp_path / "mine.mat", Reading())
     np.testing.assert_array_equal(table.columns["real"], np.arange(1.0, 20.0))
 
 
