@@ -162,7 +162,7 @@ def _without_drift(
     cut = _needs_transient(truncated, rest, groups, blind=blind)
     chosen = truncated.where(cut, rest)
     power = np.concatenate([np.mean(np.abs(group.output) ** 2, axis=1) for group in groups])
-    noise = np.maximum(pooled(truncated.noise), np.finfo(float).eps ** 2 * power) + np.finfo(float).tiny
+    noise = np.maximum(pooled(chosen.noise), np.finfo(float).eps ** 2 * power) + np.finfo(float).tiny
     usable = ~truncated.resonant
     for _ in range(2):
         if not usable.any():
