@@ -13,7 +13,6 @@ from identification.model.pulse_response import hold
 from identification.sweeps.excited_lines import excited_band, whole_periods
 from identification.sweeps.local_models import (
     COEFFICIENTS,
-    SIGNIFICANT,
     TOGETHER,
     LocalFit,
     Windows,
@@ -33,6 +32,7 @@ EVIDENT = 4.0  # the same, where a transient would cost most of what the windows
 MATERIAL = 1e-9  # of the output's power
 FEWEST = 9  # lines of a response: three windows
 END, STILL = 200, 0.01  # of the samples, at each end, and motion there over that of the record: it rests
+DRIFTS = 30.0  # of a line's noise: what a drift explains in all windows; one that is not there moves the lowest lines
 APART = 2.0  # variances with and without transient, where the two can be told apart
 
 
@@ -170,7 +170,7 @@ def _without_drift(
         weights = np.split(usable / noise, np.cumsum([len(group.input) for group in groups])[:-1])
         moved = _less_drift(groups, differences, weights, y.size / (4 * float(np.median(noise))))
         rest_moved = fit_windows(moved, transient=False)
-        if np.sum((rest.left - rest_moved.left) / noise) < SIGNIFICANT:
+        if np.sum((rest.left - rest_moved.left) / noise) < DRIFTS:
             return chosen, rest.gain
         usable = ~rest_moved.resonant
     truncated = fit_windows(moved, transient=True)
