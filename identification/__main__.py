@@ -79,14 +79,14 @@ fit_options = together(
         "--modes", default="auto", type=Counts(8), metavar="auto|N|Z/P", help="Zero and pole modes.  [default: auto]"
     ),
     click.option(
-        "--real", default="auto", type=Counts(1), metavar="auto|N|Z/P", help="Real zeros and poles.  [default: auto]"
+        "--real", default="auto", type=Counts(3), metavar="auto|N|Z/P", help="Real zeros and poles.  [default: auto]"
     ),
     click.option(
         "--integrators",
         default="auto",
-        type=click.Choice(["auto", "0", "1", "2"]),
+        type=click.Choice(["auto", "-2", "-1", "0", "1", "2"]),
         show_default=True,
-        help="Poles at s = 0.",
+        help="Poles at s = 0; negative: zeros there.",
     ),
     click.option(
         "--loss",
@@ -152,7 +152,7 @@ def fit(
         writers[responses] = lambda path: write_responses(path, fitted.tests)
     write_whole(writers, inputs=files)
     bound = [bound_text(fitted.model.additive_bound), *bound_remarks(fitted.bound_fit)]
-    click.echo("\n".join([table(fitted.plant_fit), *bound, *check_lines(fitted.checks)]))
+    click.echo("\n".join([table(fitted.plant_fit, fitted.record.cautions), *bound, *check_lines(fitted.checks)]))
 
 
 if __name__ == "__main__":

@@ -10,10 +10,11 @@ from identification.base.errors import InputError, shown
 from identification.bound.bound_residuals import bound_residuals
 from identification.fitting.fit_plant import FitResult, fit_plant
 from identification.fitting.subspace_check import check_modes
+from identification.model.fit_record import FitRecord
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
 from identification.model.reports import BoundReport, SubspaceCheck
-from identification.model.structure import Wanted
+from identification.model.structure import INTEGRATORS, MOST_REAL, Wanted
 from identification.output.fit_facts import fit_record, standard_errors
 from identification.sweeps.response import FrequencyResponse, alias_free
 
@@ -30,6 +31,8 @@ class ModelFit:
     ----------
     model
         Plant, bound, standard errors and the record of the fit.
+    record
+        How the model came about, its ``fit``.
     plant_fit, bound_fit
         How plant and bound were found.
     checks
@@ -39,6 +42,7 @@ class ModelFit:
     """
 
     model: IdentifiedModel
+    record: FitRecord
     plant_fit: FitResult
     bound_fit: BoundReport
     checks: Mapping[str, SubspaceCheck]
@@ -75,7 +79,7 @@ def fit_model(
     report = bound_residuals(result.plant, clean, plants, bound_order)
     record = fit_record(tests, result, report, checks)
     model = IdentifiedModel(result.plant, report.bound, standard_errors(result), record)
-    return ModelFit(model, result, report, checks, clean)
+    return ModelFit(model, record, result, report, checks, clean)
 
 
 def fit(
@@ -95,9 +99,9 @@ def fit(
     tests
         One or more responses of the same plant.
     modes, real
-        Zero and pole modes (up to 8 each), real zeros and poles (up to 1 each): one number for both, or a pair.
+        Zero and pole modes (up to 8 each), real zeros and poles (up to 3 each): one number for both, or a pair.
     integrators
-        Poles at s = 0, 0 to 2.
+        Poles at s = 0, up to 2; a negative number, down to -2, counts zeros there.
     soft, bound_order, seed
         As for :func:`fit_model`.
 
@@ -106,9 +110,9 @@ def fit(
     InputError
         A number is none of these, or see :func:`fit_model`.
     """
-    if integrators is not None and integrators not in (0, 1, 2):
-        raise InputError(f"integrators is {shown(integrators)}; expected 0, 1 or 2")
-    wanted = Wanted(integrators, _pair("modes", modes, MOST_MODES), _pair("real", real, 1))
+    if integrators is not None and integrators not in INTEGRATORS:
+        raise InputError(f"integrators is {shown(integrators)}; expected an integer from -2 to 2")
+    wanted = Wanted(integrators, _pair("modes", modes, MOST_MODES), _pair("real", real, MOST_REAL))
     given = [tests] if isinstance(tests, FrequencyResponse) else tests
     return fit_model(given, wanted, soft=soft, bound_order=bound_order, seed=seed).model
 

@@ -193,6 +193,11 @@ class ScaledTest:
         power = float(np.sum(np.abs(r) ** 2))
         return float(np.vdot(r[1:], r[:-1]).real / power) if power > 0 else 0.0
 
+    def distance(self, likely: Likely) -> float:
+        """The median of |test - plant|/|test| over the lines; those of no response are left out."""
+        size = np.abs(self._response(likely))
+        return float(np.median(np.abs(self._residual(likely))[size > 0] / size[size > 0]))
+
     def exact(self, likely: Likely) -> bool:
         """Whether nothing but rounding is left."""
         return max(likely.floor, likely.relative) < ROUNDING
@@ -215,15 +220,15 @@ class ScaledTest:
         likely = self._maximise(likely.structure, likely.theta, self._sigma(likely), FINE)
         structure = likely.structure
         likely = replace(likely, theta=likely.theta[structure.in_order(likely.theta)])
-        distance = float(np.median(np.abs(self._residual(likely)) / np.maximum(np.abs(self._response(likely)), 1e-300)))
+        distance = self.distance(likely)
         if distance > WORST:
             raise InputError(
-                f"{self.name}: no stable minimum phase plant with {structure} fits (median distance "
+                f"{self.name}: no stable plant with {structure} fits (median distance "
                 f"{100 * distance:.0f} % of the response); expected at most {100 * WORST:.0f} %"
             )
         correlation = self.correlation(likely)
         z = np.abs(self._residual(likely) / self._sigma(likely)) ** 2
-        freedom = 1 - structure.size / (2 * self.omega.size)
+        freedom = 1 - structure.free / (2 * self.omega.size)
         spread = float(np.mean(z)) / 2 / freedom
         if self.soft:
             spread = float(np.mean(z / (1 + z)) / 2 / np.mean((1 + z / 2) / (1 + z) ** 1.5) ** 2) / freedom

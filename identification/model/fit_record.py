@@ -10,9 +10,11 @@ from identification.base.json_object import (
     Reader,
     member,
     number,
+    numbers,
     objects,
     or_none,
     record,
+    texts,
     truth,
     words,
 )
@@ -135,6 +137,10 @@ class FitRecord:
         which a single one has not.
     agreement_of_tests
         With which probability tests of one plant would differ as much; None for a single one.
+    median_distances
+        Of each test from the nominal plant, as a share of the response.
+    cautions
+        What the data leave open, in sentences.
     tests
         Each with its own fit.
     bound
@@ -155,6 +161,8 @@ class FitRecord:
     misfit: Numbers
     scatter: Numbers | None
     agreement_of_tests: float | None
+    median_distances: tuple[float, ...]
+    cautions: tuple[str, ...]
     tests: tuple[FittedTest, ...]
     bound: BoundReport
     checks: Mapping[str, SubspaceCheck]
@@ -173,6 +181,8 @@ class FitRecord:
             "misfit_standard_errors": shaped(plant, self.misfit),
             "scatter_standard_errors": None if self.scatter is None else shaped(plant, self.scatter),
             "agreement_of_tests": self.agreement_of_tests,
+            "median_distances": list(self.median_distances),
+            "cautions": list(self.cautions),
             "tests": [test.to_dict() for test in self.tests],
             "bound": self.bound.to_dict(),
             "subspace_check": [
@@ -207,6 +217,8 @@ class FitRecord:
             misfit=values(content, "misfit_standard_errors"),
             scatter=or_none(values)(content, "scatter_standard_errors"),
             agreement_of_tests=or_none(number)(content, "agreement_of_tests"),
+            median_distances=numbers(content, "median_distances"),
+            cautions=texts(content, "cautions"),
             tests=tuple(FittedTest.from_dict(test) for test in objects(content, "tests")),
             bound=BoundReport.from_dict(member(content, "bound"), bound),
             checks={words(each, "test"): SubspaceCheck.from_dict(each) for each in objects(content, "subspace_check")},
