@@ -44,6 +44,30 @@ def guesses(omega: Real, response: Complex, sigma: Real, structure: Structure, k
     structure's degrees, D's leading coefficient 1, in Chebyshev polynomials of omega^2 (even and odd powers of
     j omega apart). Poles in the right half plane are reflected, and zeros are as far as the structure has fewer there.
     """
+    delays, costs, best, _ = _rational_fits(omega, response, sigma, structure)
+    order = np.argsort(costs)[:keep]
+    return [_guess(structure, best[k], delays[k], omega[-1], omega) for k in order]
+
+
+def unstable_poles(omega: Real, response: Complex, sigma: Real, structure: Structure) -> tuple[float, Complex]:
+    """How near a plant with poles on any side comes, as a median share of the response, and its poles on the right.
+
+    Parameters
+    ----------
+    omega, response, sigma, structure
+        As for :func:`guesses`.
+    """
+    _, costs, best, fitted = _rational_fits(omega, response, sigma, structure)
+    k = int(np.argmin(costs))
+    poles = _roots(np.append(best[k, structure.zeros + structure.right + 1 :], 1.0), omega[-1])
+    apart = np.abs(fitted[k] - 1)
+    return float(np.median(apart)), poles[poles.real > 0]
+
+
+def _rational_fits(
+    omega: Real, response: Complex, sigma: Real, structure: Structure
+) -> tuple[Real, Real, Real, Complex]:
+    """For K dead times: the costs (K,), the coefficients (K, p) and the model over the response (K, M)."""
     width, zeros = omega[-1] - omega[0], structure.zeros + structure.right
     far = 3 * (max(zeros, structure.poles) // 2) + 3
     near = likely_delays(omega, response)[:, None] + np.arange(-far, far + 1) / width
@@ -66,6 +90,7 @@ def guesses(omega: Real, response: Complex, sigma: Real, structure: Structure, k
     previous = np.ones_like(target)
     costs = np.full(delays.size, np.inf)
     best = np.zeros((delays.size, rows.shape[1]))
+    model = np.zeros_like(target)
     for _ in range(ITERATIONS):
         weight = 1 / (noise * np.abs(previous))
         weighted = np.ascontiguousarray(rows * weight[:, None, :]).view(float)
@@ -79,9 +104,8 @@ def guesses(omega: Real, response: Complex, sigma: Real, structure: Structure, k
         fitted = np.einsum("kp,mp->km", solution[:, : zeros + 1], numerator) / previous
         cost = np.sum(np.log1p(np.abs((target - fitted) / noise) ** 2), axis=1)
         better = cost < costs
-        costs[better], best[better] = cost[better], solution[better]
-    order = np.argsort(costs)[:keep]
-    return [_guess(structure, best[k], delays[k], top, omega) for k in order]
+        costs[better], best[better], model[better] = cost[better], solution[better], (fitted / target)[better]
+    return delays, costs, best, model
 
 
 def _powers(x: Real, degree: int) -> Complex:

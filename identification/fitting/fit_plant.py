@@ -18,6 +18,8 @@ from identification.model.structure import Structure, Wanted
 from identification.sweeps.response import FrequencyResponse, alias_free, require_one_band
 
 MOST_ALIKE = 3  # structures that are named beside the chosen one
+OPEN = 3.5  # half width of the interval of a gain, a logarithm, from which the data do not determine it
+FAR = 2.0  # times as far from the tests as the plant of least criterion
 CORRELATED = 0.3  # correlation of neighbouring residuals above which a fit may have missed something
 APART = 2.0  # standard errors of their distance by which two real roots are told from a mode of zeta near 1
 
@@ -129,17 +131,21 @@ def fit_plant(
     criterion = {structure: value for structure, value in criterion.items() if np.isfinite(value)}
     # exact data leave a richer structure nothing but rounding to explain
     simpler = [s for s in criterion if s.size < best.size]
+    undetermined, found = None, None
     for structure in [best, *sorted(simpler, key=criterion.__getitem__)]:
         try:
             fits = _finished(whole, selection, structure)
         except Undetermined as error:
-            undetermined = error
+            undetermined = undetermined or error
             continue
         nominal = nominal_of(whole, fits)
-        return FitResult(
+        distances = tuple(median_distance(nominal.plant, test) for test in tests)
+        if found is not None and max(distances) > FAR * max(found.distances):
+            break  # a plant that is as good as any but for its gain is better than one that is not
+        result = FitResult(
             nominal=nominal,
             tests=tuple(fits),
-            distances=tuple(median_distance(nominal.plant, test) for test in tests),
+            distances=distances,
             criterion=criterion,
             alike={
                 other: value - criterion[structure]
@@ -149,7 +155,13 @@ def fit_plant(
             overdispersion=selection.overdispersion,
             soft=soft,
         )
-    raise undetermined
+        if nominal.half_widths[0] < OPEN:
+            return result
+        found = found or result
+    if found is None:
+        assert undetermined is not None
+        raise undetermined
+    return found
 
 
 def median_distance(plant: PlantModel, test: FrequencyResponse) -> float:

@@ -178,7 +178,7 @@ def has_needle(fit: Likely, omega: Real) -> bool:
 
 
 def cancels_origin(fit: Likely, omega: Real) -> bool:
-    """Whether a zero below the lowest line cancels a pole at s = 0, or a pole there a zero, so that no line shows it."""
+    """Whether a zero below the lowest line hides a pole at s = 0 from all lines, or a pole there a zero at s = 0."""
     left, right, poles = _sides_of(fit)
     q = fit.structure.integrators
     against = [left, right] if q > 0 else [poles] if q < 0 else []

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
+from identification.fitting.dead_time import same_turn
 from identification.fitting.first_guess import guesses
 from identification.fitting.least_squares import information, response_of
 from identification.fitting.likelihood import Likely, Lines, maximise
@@ -32,6 +33,10 @@ SINGULAR = 1e-13  # smallest eigenvalue of the scaled information matrix that ca
 
 class Undetermined(InputError):
     """The data do not determine the parameters of a model."""
+
+
+class Misfit(InputError):
+    """A model is nowhere near the data."""
 
 
 @dataclass(frozen=True)
@@ -207,7 +212,7 @@ class ScaledTest:
 
         Raises
         ------
-        InputError
+        Misfit
             The model is nowhere near the data.
         Undetermined
             The data leave a parameter undetermined.
@@ -219,10 +224,14 @@ class ScaledTest:
         """
         likely = self._maximise(likely.structure, likely.theta, self._sigma(likely), FINE)
         structure = likely.structure
+        turn = same_turn(self.omega)
+        if turn is not None and likely.theta[-1] >= turn:  # of dead times that look alike, the shortest
+            start = np.append(likely.theta[:-1], likely.theta[-1] % turn)
+            likely = self._maximise(structure, start, self._sigma(likely), FINE)
         likely = replace(likely, theta=likely.theta[structure.in_order(likely.theta)])
         distance = self.distance(likely)
         if distance > WORST:
-            raise InputError(
+            raise Misfit(
                 f"{self.name}: no stable plant with {structure} fits (median distance "
                 f"{100 * distance:.0f} % of the response); expected at most {100 * WORST:.0f} %"
             )

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.base.errors import InputError
+from identification.fitting.first_guess import BAND
 from identification.fitting.likelihood import Likely
 from identification.fitting.neighbouring_structures import (
     FLIPS,
@@ -29,6 +30,7 @@ LEVELLED = 0.2  # of the path's largest gain, below which gains are taken for th
 SUPERFLUOUS = 8.0  # deviance that a mode pair too many takes off a test's white residuals; 4 to 10 seen
 ALIKE = 6.0  # criteria closer than this are no strong evidence (Raftery, Sociol. Methodol. 25, 1995)
 MATERIAL = 4.0  # times the median distance, that a root outside the band changes the response near its edge
+AT_EDGE = 1.02  # times the end of the search
 HOPELESS = 20.0  # criterion lost on the first tests after which the others are not asked
 
 
@@ -191,8 +193,8 @@ class Selection:
     def _shed(self, here: Structure, tried: set[Structure]) -> Structure:
         """What is left of a structure without the roots that the first test puts far outside the band.
 
-        That is fitted, and returned if the criterion does not speak strongly against it, or if what those roots change
-        is less than MATERIAL times what the model leaves at a line in any case. It counts as ``tried``.
+        That is fitted, and returned if the criterion does not speak strongly against it, or if those roots are where
+        the search ends and change less than MATERIAL times what the model leaves at a line. It counts as ``tried``.
         """
         first = self.tests[0]
         left = within_band(self.fits[here][0], first.omega)
@@ -205,7 +207,8 @@ class Selection:
             self.fits[there] = [fit, *(test.follow(first, fit) for test in self.tests[1:])]
             self.tick()
         worse = self.criterion(there) - self.criterion(here)
-        immaterial = not self.white(here) and left[2] < MATERIAL * first.distance(self.fits[here][0])
+        most = min(AT_EDGE / BAND, MATERIAL * first.distance(self.fits[here][0]))
+        immaterial = not self.white(here) and left[2] < most
         return there if worse < ALIKE or (immaterial and worse < np.inf) else here
 
     def _mirrored(self, here: Structure) -> Structure:

@@ -83,6 +83,10 @@ class FittedTest:
         From its own fit, as a share of the response.
     synthetic
         Whether it was never measured.
+    band
+        Its lowest and highest line, in rad/s.
+    left_out
+        Lines that were not used, in sentences.
     """
 
     name: str
@@ -95,6 +99,8 @@ class FittedTest:
     median_distance: float
     sha256: str | None
     synthetic: bool
+    band: tuple[float, float]
+    left_out: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """An entry of ``tests``."""
@@ -102,6 +108,8 @@ class FittedTest:
             "plant": plant_to_dict(self.plant),
             "standard_errors": shaped(self.plant, self.standard_errors),
             "noise": asdict(self.noise),
+            "band": list(self.band),
+            "left_out": list(self.left_out),
         }
 
     @classmethod
@@ -112,6 +120,8 @@ class FittedTest:
             "PlantModel": lambda members, key: plant,
             "Numbers": lambda members, key: from_shape(plant, member(members, key)),
             "Noise": lambda members, key: record(Noise, member(members, key)),
+            "tuple[float, float]": numbers,
+            "tuple[str, ...]": texts,
         }
         return record(cls, content, readers)
 
@@ -124,6 +134,8 @@ class FitRecord:
     ----------
     source, method, loss
         In words.
+    conjugated
+        Whether the sign of the tests' phase was reversed.
     synthetic
         Whether any of the tests was never measured.
     structure
@@ -154,6 +166,7 @@ class FitRecord:
     structure: str
     method: str
     loss: str
+    conjugated: bool
     criterion: Criterion
     lower: Numbers
     upper: Numbers
@@ -175,6 +188,7 @@ class FitRecord:
             "structure": self.structure,
             "method": self.method,
             "loss": self.loss,
+            "conjugated": self.conjugated,
             "criterion": asdict(self.criterion),
             "intervals_95": {"lower": shaped(plant, self.lower), "upper": shaped(plant, self.upper)},
             "noise_standard_errors": shaped(plant, self.noise),
@@ -210,6 +224,7 @@ class FitRecord:
             structure=words(content, "structure"),
             method=words(content, "method"),
             loss=words(content, "loss"),
+            conjugated=truth(content, "conjugated"),
             criterion=record(Criterion, member(content, "criterion"), {"Mapping[str, float]": _by_name}),
             lower=values(ends, "lower"),
             upper=values(ends, "upper"),

@@ -22,15 +22,34 @@ AT_EDGE = 0.02  # of the search, a logarithm
 OPEN = 10.0  # ratio of the ends of an interval
 
 
-def cautions(result: FitResult, tests: Sequence[FrequencyResponse]) -> list[str]:
-    """Sentences on what a fit to ``tests`` leaves open, the gravest first."""
+def cautions(result: FitResult, tests: Sequence[FrequencyResponse], reversed_from: float | None = None) -> list[str]:
+    """Sentences on what a fit to ``tests`` leaves open, the gravest first.
+
+    ``reversed_from`` is as for :func:`identification.output.fit_facts.fit_record`.
+    """
     edges = _edges(result.plant, np.concatenate([test.omega for test in tests]))
-    return [*_misfit(result), *_open(result, edges), *_dead_time(result, tests), *_alike(result)]
+    return [
+        *_reversed(result, reversed_from),
+        *_misfit(result),
+        *_open(result, edges),
+        *_dead_time(result, tests),
+        *_alike(result),
+    ]
+
+
+def _reversed(result: FitResult, reversed_from: float | None) -> Iterator[str]:
+    if reversed_from is not None:
+        own = max(test.distance for test in result.tests)
+        before = f"as it is at {100 * reversed_from:.2g} %" if np.isfinite(reversed_from) else "as it is not at all"
+        yield (
+            f"the sign of the phase is reversed: the conjugate fits at {100 * own:.2g} %, the response {before}; if a "
+            "lag is negative in these files, the plant is unstable and this is another"
+        )
 
 
 def _misfit(result: FitResult) -> Iterator[str]:
     own, nominal = max(test.distance for test in result.tests), max(result.distances)
-    if own > POOR:
+    if own > POOR and max(test.relative for test in result.tests) > POOR:
         yield f"a median distance of {100 * own:.2g} % is more than noise leaves on a plant of this class"
     if nominal > POOR and nominal > WORSE * own:
         yield (
@@ -95,8 +114,8 @@ def _alike(result: FitResult) -> Iterator[str]:
             yield f"the data hardly tell this structure from {structure} (its BIC is {more:+.1f})"
         else:
             yield (
-                f"the BIC alone would choose {structure} ({more:+.1f}), whose roots outside the band change the response "
-                "by no more than what this class leaves of these data"
+                f"the BIC alone would choose {structure} ({more:+.1f}), whose roots outside the band change the "
+                "response by no more than what this class leaves of these data"
             )
 
 

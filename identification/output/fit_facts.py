@@ -27,9 +27,17 @@ def standard_errors(result: FitResult) -> Numbers:
 
 
 def fit_record(
-    tests: Sequence[FrequencyResponse], result: FitResult, report: BoundReport, checks: Mapping[str, SubspaceCheck]
+    tests: Sequence[FrequencyResponse],
+    result: FitResult,
+    report: BoundReport,
+    checks: Mapping[str, SubspaceCheck],
+    reversed_from: float | None,
 ) -> FitRecord:
-    """What model.json records of a fit: its tests' files, and how W_a lies over the residuals."""
+    """What model.json records of a fit: its tests' files, and how W_a lies over the residuals.
+
+    ``reversed_from`` is how far the tests were from a plant before the sign of their phase was reversed; None if it
+    was not.
+    """
     nominal = result.nominal
     how = "each test on its own; mean of the logarithms, mean delay" if nominal.scattered else "one plant for all"
     lower, upper = nominal.intervals
@@ -52,7 +60,8 @@ def fit_record(
         agreement_of_tests=nominal.agreement,
         tests=tuple(_test_record(test, fit) for test, fit in zip(tests, result.tests, strict=True)),
         median_distances=result.distances,
-        cautions=tuple(cautions(result, tests)),
+        conjugated=reversed_from is not None,
+        cautions=tuple(cautions(result, tests, reversed_from)),
         bound=report,
         checks=checks,
     )
@@ -71,6 +80,8 @@ def _test_record(test: FrequencyResponse, fit: OneFit) -> FittedTest:
         median_distance=fit.distance,
         sha256=None if file is None else hashlib.sha256(read_bytes(file)).hexdigest(),
         synthetic=test.synthetic,
+        band=(float(test.omega[0]), float(test.omega[-1])),
+        left_out=tuple(map(str, test.left_out)),
     )
 
 
