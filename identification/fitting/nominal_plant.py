@@ -145,6 +145,10 @@ def nominal_of(tests: Sequence[ScaledTest], fits: Sequence[OneFit]) -> Nominal:
             units = np.sqrt(variances.mean(axis=0))
             information = np.linalg.inv(covariances / np.outer(units, units)).sum(axis=0)
             noise = np.diag(np.linalg.inv(information)) * units**2
+            # weights that are estimated make a mean less sure than known ones (Meier, Biometrics 9, 1953)
+            shares = 1 / variances / np.sum(1 / variances, axis=0)
+            freedoms = np.array([[fit.lines * 2 - structure.free - NOISE] for fit in fits])
+            noise *= 1 + np.sum(4 / np.maximum(freedoms, 1) * shares * (1 - shares), axis=0)
     misfit = np.mean([fit.misfit * variance for fit, variance in zip(fits, variances, strict=True)], axis=0)
     return Nominal(
         structure=structure,

@@ -237,7 +237,7 @@ class ScaledTest:
             )
         correlation = self.correlation(likely)
         z = np.abs(self._residual(likely) / self._sigma(likely)) ** 2
-        freedom = 1 - structure.free / (2 * self.omega.size)
+        freedom = 1 - (structure.free + 1) / (2 * self.omega.size)  # the ratio of the noise's two levels counts too
         spread = float(np.mean(z)) / 2 / freedom
         if self.soft:
             spread = float(np.mean(z / (1 + z)) / 2 / np.mean((1 + z / 2) / (1 + z) ** 1.5) ** 2) / freedom
