@@ -36,6 +36,7 @@ EXCLUSIVE: list[tuple[set[str], ...]] = [
 ]
 MOST_NAMES = 12  # in one sentence
 MOST_CHARACTERS = 40  # of something found
+SHOWN = 0.05  # of a difference that is rounded away
 
 
 @dataclass(frozen=True)
@@ -147,13 +148,13 @@ def rows_of(table: Table, rows: Whole) -> Table:
     return replace(table, columns=columns, numbers=table.numbers[rows])
 
 
-def digits(*numbers: complex) -> tuple[str, ...]:
-    """The numbers with ten digits, or as many more as tell them apart."""
-    texts = tuple(f"{number:.10g}" for number in numbers)
-    for count in range(11, 18):
-        if len(set(texts)) == len(set(numbers)):
+def digits(found: float, expected: float) -> tuple[str, str]:
+    """Two numbers with ten digits, or with as many more as show by how much they differ."""
+    apart = found - expected
+    for count in range(10, 18):
+        texts = (f"{found:.{count}g}", f"{expected:.{count}g}")
+        if abs(float(texts[0]) - float(texts[1]) - apart) <= SHOWN * abs(apart):
             break
-        texts = tuple(f"{number:.{count}g}" for number in numbers)
     return texts
 
 

@@ -108,7 +108,7 @@ def name_columns(place: str, names: Sequence[str], meant: Mapping[str, str]) -> 
         choose_columns(place, [name for name in ours if name in KNOWN], "columns")
         return own
     spellings = [(index, said) for index, name in enumerate(ours) if name not in KNOWN and (said := spelt(name))]
-    by_label: dict[str, dict[str, tuple[int, float]]] = {"": own}
+    by_label: dict[str, dict[str, tuple[int, float]]] = {"": {}}
     for index, said in spellings:
         group = by_label.setdefault(said.label, {})
         if said.ours and said.ours not in own:
@@ -116,7 +116,7 @@ def name_columns(place: str, names: Sequence[str], meant: Mapping[str, str]) -> 
                 both = " and ".join(quoted(names[each]) for each in (group[said.ours][0], index))
                 raise InputError(f'{place}: both {both} say {said.ours}; expected one, or --columns "NAME={said.ours}"')
             group.setdefault(said.ours, (index, said.factor))
-    shared = by_label.pop("")
+    shared = own | by_label.pop("")
     complete = {label: test for label, group in {"": {}, **by_label}.items() if (test := _test(shared | group))}
     if "" in complete:
         return complete[""]

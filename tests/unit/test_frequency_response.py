@@ -146,6 +146,8 @@ KINDS = (
     "or time_s, input, output (or omega, magnitude, phase_rad, input_held in their place), or --columns NAME=OURS"
 )
 
+UNIFORM = "expected about 0.07 (uniform sampling, within 5 % of an interval), or --resample"
+
 
 @pytest.mark.parametrize(
     ("lines", "sentence"),
@@ -236,11 +238,11 @@ KINDS = (
         ),
         (
             _changed(RAW, 9, None),
-            ", line 9: time_s is 0.08; expected about 0.07 (uniform sampling, within 5 % of an interval), or --resample",
+            f", line 9: time_s is 0.08; {UNIFORM}",
         ),
         (
             _changed(RAW, 9, "0.0712,1,0"),
-            ", line 9: time_s is 0.0712; expected about 0.07 (uniform sampling, within 5 % of an interval), or --resample",
+            f", line 9: time_s is 0.0712; {UNIFORM}",
         ),
         (RAW[:100], ": holds 99 samples; expected 128 or more"),
         ([RAW[0], *(f"{k},2,{k % 7}" for k in range(200))], ": the input is 2 throughout; expected a sweep"),
