@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import re
 from collections.abc import Iterator
-from io import StringIO
 from pathlib import Path
 
 from identification.base.errors import InputError
@@ -44,8 +43,7 @@ def read_any_text(path: Path) -> str:
         )
     if (zero := text.find("\0")) >= 0:
         raise InputError(f"{path}: character {zero} is zero; expected a text file (UTF-16 with a byte order mark)")
-    with StringIO(text.replace(MINUS, "-"), newline=None) as lines:
-        return lines.read()
+    return text.replace("\r\n", "\n").replace("\r", "\n").replace(MINUS, "-")
 
 
 def text_lines(text: str) -> Iterator[tuple[int, str]]:

@@ -14,6 +14,7 @@ JITTER = 0.05  # largest distance of a sample from the uniform grid, in sampling
 ROUNDED = 1e-6  # of the last digit: the distance of a stamp from a multiple of it, beside the rounding of floats
 FEWEST_STEPS = 5  # of the rarer length: one longer step is a missing row, many are a rounded interval
 MOST_ADDED = 2.0  # times as many rows as the record has
+SHORTEST_S = 1e-50  # interval
 SMALL = 0.01  # error of the cubic up to the frequency that is told
 
 
@@ -41,12 +42,14 @@ def on_even_grid(table: Table, *, resample: bool) -> tuple[Table, float]:
     steps = np.diff(time_s)
     count = np.arange(time_s.size)
     even_s = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
+    if 0 < even_s < SHORTEST_S:
+        table.refuse(f"the samples lie {even_s:.3g} s apart; expected {SHORTEST_S:g} s or more")
     if even_s > 0 and np.max(np.abs((time_s - time_s[0]) / even_s - count)) <= JITTER:
         _check_order(table)
         return table, even_s
     centred = count - count.mean()
     fitted_s = float(centred @ (time_s - time_s.mean()) / (centred @ centred))
-    unit = _last_digit(time_s, fitted_s) if fitted_s > 0 and steps.min() >= 0 else 0.0
+    unit = _last_digit(time_s, fitted_s) if fitted_s >= SHORTEST_S and steps.min() >= 0 else 0.0
     off = np.abs(time_s - time_s.mean() - fitted_s * centred)
     if unit and off.max() <= unit / 2 + JITTER * fitted_s and _often_rounded(steps, unit):
         remark = f"the time stamps are rounded to {unit:.3g} s; all fit {1 / fitted_s:.9g} samples a second"
