@@ -245,7 +245,7 @@ def test_readings_at_one_frequency_are_averaged(tmp_path: Path) -> None:
     np.testing.assert_allclose(test.excitation * count, np.full(F.size, test.excitation[0]), rtol=1e-12)
     np.testing.assert_array_equal(test.coherence, 0 * F + 0.5)
     (remark,) = test.remarks
-    said = "6 of 12 frequencies hold several readings, which were averaged; one scatters by "
+    said = "6 of 12 frequencies hold several readings, which were averaged; a single one scatters by "
     assert remark.startswith(said)
     assert float(remark.removeprefix(said).removesuffix(" %")) == pytest.approx(5, abs=0.5)
 
