@@ -44,7 +44,7 @@ def read_mat(path: Path, reading: Reading) -> list[Table]:
     classes = {name: kind for name, _, kind in headers}
     usable = {name for name, kind in classes.items() if kind in (LABELS if name == "test" else NUMERIC)}
     names = [name if name in usable else f"{name} ({kind})" for name, kind in classes.items()]
-    wanted = choose_columns(str(path), names, "variables", may_be_complex=True)
+    wanted = choose_columns(str(path), names, "variables")
     with_labels = [*wanted, "test"] if "test" in usable else wanted
     for name, shape, _ in headers:
         if name in with_labels:
