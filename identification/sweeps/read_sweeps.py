@@ -12,6 +12,7 @@ from identification.base.errors import InputError, printable
 from identification.base.files import is_folder, require_readable, true_path
 from identification.formats.columns import Table
 from identification.formats.csv_file import read_csv
+from identification.formats.first_bytes import usual_suffix
 from identification.formats.mat_file import read_mat
 from identification.formats.reading import Reading
 from identification.formats.uff_file import read_uff
@@ -27,14 +28,14 @@ CONSTANT = 1e-9  # of a signal's size
 LARGEST = 1e50  # number in a column
 MOST_POINTS = 20_000_000  # lines or samples of a test; a fit takes some 200 bytes of memory for each
 KEPT = ".npz"
-READERS = {".csv": read_csv, ".mat": read_mat, ".uff": read_uff, ".unv": read_uff, ".58": read_uff}
+READERS = {".csv": read_csv, ".mat": read_mat, **dict.fromkeys((".uff", ".unv", ".ufb", ".58"), read_uff)}
 
 
 def input_files(paths: Sequence[Path | str]) -> list[Path]:
     """The files that a list of files and folders means, in its order.
 
-    A folder means the files in it that end in .csv, .mat, .uff, .unv or .58, sorted by name; hidden ones and folders
-    within are left out.
+    A folder means the files in it that end in .csv, .mat, .uff, .unv, .ufb or .58, sorted by name; hidden ones and
+    folders within are left out.
 
     Raises
     ------
@@ -59,11 +60,12 @@ def read_sweeps(paths: Path | str | Sequence[Path | str], reading: Reading | Non
 
     A file that ends in .npz holds responses that were estimated before, see
     :mod:`identification.sweeps.kept_responses`; they keep their names and the paths that they came from. Every other
-    file holds frequency responses or raw records: a MAT file if its name ends in .mat, a universal file if it ends
-    in .uff, .unv or .58, and else a CSV. Its columns, in a MAT file its variables, say what they are by their names:
-    frequency_hz or omega (rad/s); magnitude_db or magnitude, with phase_deg or phase_rad; or real, imag; and
-    coherence if there is one. A raw record has time_s, output, and input (band-limited like the output before both are
-    sampled) or input_held (the command of a converter that holds it for one interval), and goes through
+    file holds frequency responses or raw records: a MAT or universal file if it begins as such a file does, or its
+    name ends in .mat, .uff, .unv, .ufb or .58, and else a CSV. Its columns, in a MAT file its variables, say what
+    they are by their names: frequency_hz or omega (rad/s); magnitude_db or magnitude, with phase_deg or phase_rad;
+    or real, imag; and coherence if there is one. A raw record has time_s, output, and input (band-limited like the
+    output before both are sampled) or input_held (the command of a converter that holds it for one interval), and
+    goes through
     :func:`identification.sweeps.estimate_response.estimate_response`. A column ``test`` tells several tests apart.
 
     Raises
@@ -79,7 +81,8 @@ def read_sweeps(paths: Path | str | Sequence[Path | str], reading: Reading | Non
         if file.suffix.lower() == KEPT:
             tests += read_responses(file)
             continue
-        for table in READERS.get(file.suffix.lower(), read_csv)(file, reading or Reading()):
+        suffix = usual_suffix(file) or file.suffix.lower()
+        for table in READERS.get(suffix, read_csv)(file, reading or Reading()):
             label = name if table.test is None else f"{name}, test {table.test}"
             tests.append(_from_record(table, label) if "time_s" in table.columns else _from_response(table, label))
     return tests

@@ -1,19 +1,17 @@
-"""Reading sweeps from MATLAB and universal files: written with known numbers, read back, damaged and refused."""
+"""Reading sweeps from MATLAB files: written with known numbers, read back, damaged and refused."""
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import pyuff
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 from sweep_columns import COLUMNS as SHARED
-from sweep_columns import FREQUENCY_HZ, RESPONSE
+from sweep_columns import FREQUENCY_HZ, RESPONSE, require_sentence_after_damage
 
 from identification.base.errors import InputError
 from identification.sweeps.read_sweeps import read_sweeps
@@ -202,165 +200,10 @@ def test_mat_of_version_7_3_and_no_mat_at_all(tmp_path: Path) -> None:
     assert _refusal(path).endswith("); expected a MAT file of version 4 to 7")
 
 
-def _function(kind: int, x: np.ndarray, data: np.ndarray, **fields: Any) -> dict[str, Any]:
-    point = {"rsp_node": 1, "rsp_dir": 3, "ref_node": 2, "ref_dir": 3}
-    return (
-        {
-            "type": 58,
-            "func_type": kind,
-            "x": x,
-            "data": data,
-            "abscissa_spacing": 1,
-            "orddenom_spec_data_type": 0,
-            "binary": 0,
-        }
-        | point
-        | fields
-    )
-
-
-def _uff(tmp_path: Path, *functions: dict[str, Any], name: str = "beam.uff") -> Path:
-    path = tmp_path / name
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ResourceWarning)  # pyuff leaves a file open when it writes binary data
-        pyuff.UFF(str(path)).write_sets([dict(function) for function in functions], mode="add")
-    return path
-
-
-FRF = _function(4, FREQUENCY_HZ, RESPONSE, abscissa_axis_units_lab="Hz")
-INPUT = _function(1, TIME_S, SWEEP, id1="input")
-OUTPUT = _function(1, TIME_S, NOISE, id1="output")
-
-
-@pytest.mark.parametrize("suffix", ["uff", "UNV", "58"])
-@pytest.mark.parametrize("binary", [0, 1])
-@pytest.mark.parametrize("spacing", [0, 1])
-def test_uff_reads_back(tmp_path: Path, spacing: int, binary: int, suffix: str) -> None:
-    written = FRF | {"abscissa_spacing": spacing, "binary": binary, "id2": "SYNTHETIC"}
-    test = _only_test(_uff(tmp_path, written, name=f"beam.{suffix}"))
-    np.testing.assert_allclose(test.omega, 2 * np.pi * FREQUENCY_HZ, rtol=1e-14)
-    np.testing.assert_allclose(test.response, RESPONSE, rtol=1e-15 if binary else 1e-11)  # 12 digits in text
-    assert test.coherence is None
-    assert test.name == f"beam.{suffix}"
-    assert test.synthetic
-
-
-def test_uff_with_several_tests_their_coherences_and_other_functions(tmp_path: Path) -> None:
-    x = FREQUENCY_HZ - 1
-    path = _uff(
-        tmp_path,
-        _function(2, x, RESPONSE),
-        _function(4, x, RESPONSE),
-        _function(6, x, COHERENCE),
-        {"type": 164, "units_code": 1, "length": 1, "force": 1, "temp": 1, "temp_offset": 0},
-        _function(4, x, 2 * RESPONSE, rsp_node=5),
-        _function(4, x, 3 * RESPONSE),
-        _function(6, x, COHERENCE / 2),
-        _function(1, TIME_S, SWEEP, id1="tacho"),
-    )
-    tests = read_sweeps([path])
-    assert [test.name for test in tests] == ["beam.uff, test 1", "beam.uff, test 2", "beam.uff, test 3"]
-    for test, factor in zip(tests, (1, 2, 3), strict=True):
-        np.testing.assert_allclose(test.omega, 2 * np.pi * x[1:])  # without the line at 0 Hz
-        np.testing.assert_allclose(test.response, factor * RESPONSE[1:], rtol=1e-11)
-    assert tests[0].coherence is not None
-    assert tests[1].coherence is None
-    assert tests[2].coherence is not None
-    np.testing.assert_allclose(tests[0].coherence, COHERENCE[1:])
-    np.testing.assert_allclose(tests[2].coherence, COHERENCE[1:] / 2)
-
-
-def test_uff_raw_records(tmp_path: Path) -> None:
-    u = np.random.default_rng(1).standard_normal(1024)
-    time_s = np.arange(1024) / 128
-    signals = [_function(1, time_s, k * u, id1=name) for k in (1, 2) for name in ("output", "input")]
-    tests = read_sweeps([_uff(tmp_path, *signals, OUTPUT | {"id1": "tacho"})])
-    assert [test.name for test in tests] == ["beam.uff, test 1", "beam.uff, test 2"]
-    for test in tests:
-        np.testing.assert_allclose(test.response, 1, rtol=1e-5)
-        assert test.record is not None
-        assert test.record.sampling_s == 1 / 128
-
-
-EXPECTED_58 = (
-    "expected data sets 58 of function type 4, or of type 1 with the first line input (or input_held) and output"
-)
-OTHER_ABSCISSA = ", data set 2: the abscissa is another than that of data set 1; expected the same"
-
-
-@pytest.mark.parametrize(
-    ("functions", "sentence"),
-    [
-        ([_function(2, FREQUENCY_HZ, RESPONSE)], f": holds no frequency response; {EXPECTED_58}"),
-        (
-            [INPUT | {"id1": "Input"}, OUTPUT | {"id1": "force"}],
-            f": holds no frequency response but time responses 'Input', 'force'; {EXPECTED_58}",
-        ),
-        ([FRF, INPUT, OUTPUT], ": holds frequency responses and records of input and output; expected one of them"),
-        ([INPUT, OUTPUT, OUTPUT], ": holds 1 inputs and 2 outputs; expected as many"),
-        ([FRF | {"data": RESPONSE.real}], ", data set 1: the values are real; expected complex ones"),
-        ([INPUT | {"data": 1j * SWEEP}, OUTPUT], ", data set 1: the values are complex; expected real ones"),
-        (
-            [FRF | {"abscissa_axis_units_lab": "rad/s"}],
-            ", data set 1: the abscissa's unit is 'rad/s'; expected Hz",
-        ),
-        ([INPUT, OUTPUT | {"abscissa_axis_units_lab": "ms"}], ", data set 2: the abscissa's unit is 'ms'; expected s"),
-        (
-            [INPUT | {"abscissa_spacing": 0}, OUTPUT],
-            ", data set 1: the abscissa is uneven; expected an even one",
-        ),
-        ([INPUT, _function(1, 2 * TIME_S, NOISE, id1="output")], OTHER_ABSCISSA),
-        ([FRF, _function(6, FREQUENCY_HZ + 1, COHERENCE)], OTHER_ABSCISSA),
-        (
-            [FRF, FRF, _function(6, FREQUENCY_HZ, COHERENCE)],
-            ", data set 1: 2 frequency responses and 1 coherences have its nodes and directions; "
-            "expected one coherence for each",
-        ),
-        (
-            [FRF, FRF | {"abscissa_spacing": 0, "x": _with(FREQUENCY_HZ, 3, 3)}],
-            ", test 2: frequency_hz(4) is 3; expected more than the 3 of frequency_hz(3) (increasing, no duplicates)",
-        ),
-        ([FRF, _function(6, FREQUENCY_HZ, COHERENCE + 1)], ": coherence(1) is 1.99; expected a number from 0 to 1"),
-        ([INPUT | {"data": 0 * SWEEP}, OUTPUT], ": the input is 0 throughout; expected a sweep"),
-    ],
-)
-def test_uff_refusal_in_one_sentence(tmp_path: Path, functions: list[dict[str, Any]], sentence: str) -> None:
-    assert _refusal(_uff(tmp_path, *functions)) == sentence
-
-
-def test_uff_that_is_cut_off_or_none(tmp_path: Path) -> None:
-    path = _uff(tmp_path, FRF, FRF)
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-    path.write_text("".join(lines[:14] + lines[15:]), encoding="utf-8")
-    assert _refusal(path) == ", data set 1: cannot be read (8 of 10 values); expected a complete data set 58"
-    path.write_text("".join(lines[:9] + lines[15:]), encoding="utf-8")
-    assert _refusal(path).startswith(", data set 1: cannot be read (")
-    assert _refusal(path).endswith("); expected a complete data set 58")
-    path.write_text("frequency_hz,real,imag\n", encoding="utf-8")
-    assert _refusal(path) == f": holds no frequency response; {EXPECTED_58}"
-
-
-@pytest.mark.parametrize("suffix", ["mat", "uff"])
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
-def test_no_damage_raises_anything_else(tmp_path: Path, suffix: str, data: st.DataObject) -> None:
-    whole = tmp_path / f"whole.{suffix}"
-    if not whole.exists():
-        if suffix == "mat":
-            savemat(whole, {"omega": FREQUENCY_HZ, "response": RESPONSE, "test": np.array(["a"] * 10, dtype=object)})
-        else:
-            _uff(tmp_path, FRF | {"binary": 1}, _function(6, FREQUENCY_HZ, COHERENCE), name=whole.name)
-    content = bytearray(whole.read_bytes())
-    for place, byte in data.draw(
-        st.lists(st.tuples(st.integers(0, len(content) - 1), st.integers(0, 255)), max_size=4)
-    ):
-        content[place] = byte
-    path = tmp_path / f"damaged.{suffix}"
-    path.write_bytes(content[: data.draw(st.integers(0, len(content)))] if data.draw(st.booleans()) else content)
-    try:
-        read_sweeps([path])
-        sentence = str(path)
-    except InputError as refusal:
-        sentence = str(refusal)
-    assert sentence.startswith(str(path))
-    assert len(sentence.splitlines()) == 1
+def test_no_damage_raises_anything_else(tmp_path: Path, data: st.DataObject) -> None:
+    path = tmp_path / "whole.mat"
+    if not path.exists():
+        savemat(path, {"omega": FREQUENCY_HZ, "response": RESPONSE, "test": np.array(["a"] * 10, dtype=object)})
+    require_sentence_after_damage(path, data)

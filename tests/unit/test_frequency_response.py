@@ -130,7 +130,9 @@ def test_equal_base_names_are_told_apart(tmp_path: Path) -> None:
 def test_what_files_are_refused(tmp_path: Path) -> None:
     empty = tmp_path / "empty"
     empty.mkdir()
-    with pytest.raises(InputError, match=r"empty: holds no file that ends in .csv, .mat, .uff, .unv, .58; expected"):
+    with pytest.raises(
+        InputError, match=r"empty: holds no file that ends in .csv, .mat, .uff, .unv, .ufb, .58; expected"
+    ):
         input_files([empty])
     path = _write(tmp_path, FRF)
     with pytest.raises(InputError, match=r"sweep.csv: is given twice; expected each file once$"):
