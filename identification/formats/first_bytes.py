@@ -22,9 +22,20 @@ def usual_suffix(path: Path) -> str:
     InputError
         The file cannot be read.
     """
+    head = first_bytes(path)
+    return next((suffix for suffix, begins in FIRST_BYTES.items() if begins.match(head)), "")
+
+
+def first_bytes(path: Path) -> bytes:
+    """The beginning of a file.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    """
     try:
         with path.open("rb") as file:
-            head = file.read(HEAD)
+            return file.read(HEAD)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    return next((suffix for suffix, begins in FIRST_BYTES.items() if begins.match(head)), "")

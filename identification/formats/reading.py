@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from identification.base.errors import InputError
+from identification.formats.columns import KNOWN, quoted
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -20,9 +23,19 @@ class Reading:
         that holds one only.
     resample
         Whether a record with uneven time stamps is brought to an even grid instead of being refused.
+
+    Raises
+    ------
+    InputError
+        ``columns`` holds a name of ours that there is not.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
     node: int | None = None
     direction: int | None = None
     resample: bool = False
+
+    def __post_init__(self) -> None:
+        if unknown := sorted({*self.columns.values()} - KNOWN):
+            names = ", ".join(sorted(KNOWN))
+            raise InputError(f"--columns: {quoted(unknown[0])} is no name of ours; expected one of {names}")
