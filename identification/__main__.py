@@ -152,7 +152,8 @@ def fit(
         writers[responses] = lambda path: write_responses(path, fitted.tests)
     write_whole(writers, inputs=files)
     bound = [bound_text(fitted.model.additive_bound), *bound_remarks(fitted.bound_fit)]
-    click.echo("\n".join([table(fitted.plant_fit), *bound, *check_lines(fitted.checks)]))
+    remarks = [f"{test.name}: {remark}" for test in tests for remark in test.remarks]
+    click.echo("\n".join([table(fitted.plant_fit), *remarks, *bound, *check_lines(fitted.checks)]))
 
 
 if __name__ == "__main__":

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.base.arrays import Array, Whole
+from identification.base.arrays import Array
 from identification.base.errors import InputError
-from identification.formats.columns import INPUTS, Table, quoted
+from identification.formats.columns import COMPLEX, INPUTS, Table, quoted
 from identification.formats.reading import Reading
 from identification.formats.uff_ends import of_one_plant
 from identification.formats.uff_function import Function, read_functions
@@ -37,7 +37,7 @@ def read_uff(path: Path, reading: Reading) -> list[Table]:
     A coherence (type 6) belongs to the frequency response of the same nodes and directions, the second one to the
     second. The record of a test is a time response whose first identification line is ``input`` or ``input_held``,
     or stands for it in ``reading.columns``, and one where it is ``output``, the second input with the second output.
-    A line at 0 Hz is left out. So are other functions and other data sets.
+    Other functions and other data sets are left out.
 
     The tests are those of one plant: of one node and direction of the response and one of the reference. Of several
     responses, or where all have the same of several references (a hammer that moves), ``reading.node`` and
@@ -70,8 +70,15 @@ def read_uff(path: Path, reading: Reading) -> list[Table]:
     else:
         raise InputError(f"{path}: {_what_else(functions, signals)}; {EXPECTED}")
     return [
-        Table(path, columns, kept, in_lines=False, test=str(k) if len(tests) > 1 else None, synthetic=synthetic)
-        for k, (columns, kept) in enumerate(tests, 1)
+        Table(
+            path,
+            columns,
+            np.arange(1, len(columns[COMPLEX if responses else "output"]) + 1),
+            in_lines=False,
+            test=str(k) if len(tests) > 1 else None,
+            synthetic=synthetic,
+        )
+        for k, columns in enumerate(tests, 1)
     ]
 
 
@@ -90,12 +97,11 @@ def _what_else(functions: Sequence[Function], signals: Sequence[Function]) -> st
 
 def _response(
     path: Path, response: Function, siblings: Sequence[Function], coherences: Sequence[Function]
-) -> tuple[dict[str, Array], Whole]:
+) -> dict[str, Array]:
     """The columns of a frequency response, one of its ``siblings`` of the same nodes and directions."""
     unit = _unit(path, response, ("frequency_hz", "omega"))
     _check(path, response, is_complex=True)
-    kept = np.flatnonzero(response.x != 0)
-    columns = {unit: response.x[kept], "response": response.values[kept]}
+    columns = {unit: response.x, COMPLEX: response.values}
     own = [coherence for coherence in coherences if coherence.ends == response.ends]
     if own:
         if len(own) != len(siblings):
@@ -106,16 +112,16 @@ def _response(
         coherence = own[siblings.index(response)]
         _check(path, coherence, is_complex=False)
         _check_same(path, response, coherence)
-        columns["coherence"] = coherence.values[kept]
-    return columns, kept + 1
+        columns["coherence"] = coherence.values
+    return columns
 
 
-def _record(path: Path, driven: str, one: Function, other: Function) -> tuple[dict[str, Array], Whole]:
+def _record(path: Path, driven: str, one: Function, other: Function) -> dict[str, Array]:
     for signal in (one, other):
         _unit(path, signal, ("time_s",))
         _check(path, signal, is_complex=False)
     _check_same(path, one, other)
-    return {"time_s": one.x, driven: one.values, "output": other.values}, np.arange(1, one.x.size + 1)
+    return {"time_s": one.x, driven: one.values, "output": other.values}
 
 
 def _unit(path: Path, function: Function, columns: Sequence[str]) -> str:

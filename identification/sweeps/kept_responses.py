@@ -26,6 +26,7 @@ def write_responses(path: Path, tests: Sequence[FrequencyResponse]) -> None:
             name=[test.name for test in tests],
             path=[str(test.path or "") for test in tests],
             synthetic=[test.synthetic for test in tests],
+            remarks=["\n".join(test.remarks) for test in tests],
             **{name: curve for name, curve in curves.items() if curve is not None},
         )
 
@@ -56,6 +57,7 @@ def read_responses(path: Path) -> list[FrequencyResponse]:
                 content.get(f"excitation_{i}"),
                 synthetic=bool(content["synthetic"][i]),
                 path=Path(str(content["path"][i])) if content["path"][i] else None,
+                remarks=tuple(str(content["remarks"][i]).splitlines()) if "remarks" in content else (),
             )
             for i, name in enumerate(content["name"])
         ]

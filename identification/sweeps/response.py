@@ -69,6 +69,8 @@ class FrequencyResponse:
         What the response was estimated from, or None where the file holds the response.
     path
         The file, or None.
+    remarks
+        What was left out or changed while the test was read.
     """
 
     omega: Real
@@ -79,6 +81,7 @@ class FrequencyResponse:
     synthetic: bool = False
     record: Record | None = None
     path: Path | None = None
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         omega, response = np.asarray(self.omega, dtype=float), np.asarray(self.response, dtype=complex)

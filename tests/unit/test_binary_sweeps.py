@@ -93,7 +93,7 @@ def test_mat_with_a_label_for_each_row(tmp_path: Path) -> None:
     path = _mat(
         tmp_path,
         omega=np.tile(FREQUENCY_HZ, 2),
-        response=np.tile(RESPONSE, 2),
+        response=np.append(RESPONSE, 2 * RESPONSE),
         test=np.repeat([1, 2], FREQUENCY_HZ.size),
     )
     assert [test.name for test in read_sweeps([path])] == ["sweep.mat, test 1", "sweep.mat, test 2"]
@@ -202,10 +202,6 @@ EXPECTED = (
             ": omega(3) is nan; expected a finite number",
         ),
         (
-            {"omega": _with(FREQUENCY_HZ, 2, 1.5), "response": RESPONSE},
-            ": omega(3) is 1.5; expected more than the 2 of omega(2) (increasing, no duplicates)",
-        ),
-        (
             {"omega": FREQUENCY_HZ, "response": np.stack([RESPONSE, _with(RESPONSE, 4, np.inf)], axis=1)},
             ", test 2: response(5) is inf+0j; expected a finite number",
         ),
@@ -216,7 +212,8 @@ EXPECTED = (
         ({"omega": FREQUENCY_HZ[:0], "response": RESPONSE[:0]}, ": omega is 0 x 0; expected a vector"),
         (
             {"time_s": _with(TIME_S, 9, 0.069), "input": SWEEP, "output": NOISE},
-            ": time_s(10) is 0.069; expected about 0.0703125 (uniform sampling, within 5 % of an interval)",
+            ": time_s(10) is 0.069; expected about 0.0703125 (uniform sampling, within 5 % of an interval), "
+            "or --resample",
         ),
         (
             {"time_s": TIME_S, "input": SWEEP, "output": 0 * NOISE},

@@ -122,7 +122,7 @@ def _refused(result: Result, folder: Path, *words: str) -> None:
         ("time_s,output\n0,1\n", ["bad.csv, line 1", "time_s, input, output"]),
         ("frequency_hz,real,imag\n1,2,x\n", ["bad.csv, line 2", "imag is 'x'", "a finite number"]),
         ("frequency_hz,real,imag\n1,2,nan\n", ["bad.csv, line 2", "imag is 'nan'"]),
-        ("frequency_hz,real,imag\n2,1,1\n1,1,1\n", ["bad.csv, line 3", "frequency_hz is 1"]),
+        ("frequency_hz,real,imag\n2,1,1\n-1,1,1\n", ["bad.csv, line 3", "frequency_hz is -1"]),
         ("frequency_hz,real,imag\n1,1,1\n", ["bad.csv", "holds 1 frequencies", "8 or more"]),
         ("time_s,input,output\n" + "".join(f"{k},1,{k % 5}\n" for k in range(300)), ["the input is 1 throughout"]),
     ],

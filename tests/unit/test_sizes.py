@@ -28,7 +28,7 @@ from identification.formats.reading import Reading
 from identification.model.plant import Mode, PlantModel
 from identification.model.structure import Structure
 from identification.sweeps import estimate_response as module
-from identification.sweeps import read_sweeps as reader
+from identification.sweeps import from_table as reader
 from identification.sweeps.read_sweeps import read_sweeps
 from identification.sweeps.response import FrequencyResponse
 
