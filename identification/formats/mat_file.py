@@ -111,7 +111,8 @@ def _of_level_4(path: Path) -> Iterator[tuple[str, Variable]]:
 
 
 def _level_4_values(path: Path, name: str) -> Array:
-    return np.asarray(loadmat(str(path), appendmat=False, variable_names=[name])[name])
+    read = loadmat(str(path), appendmat=False, variable_names=[name], chars_as_strings=False)
+    return np.asarray(read[name])
 
 
 def _read(path: Path, name: str, variable: Variable, factor: float) -> Array:

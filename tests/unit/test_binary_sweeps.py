@@ -89,6 +89,13 @@ def test_mat_with_a_column_for_each_test(tmp_path: Path, labels: Any, names: lis
     np.testing.assert_array_equal(tests[2].response, 3 * RESPONSE)
 
 
+def test_mat_of_version_4_with_labels_of_letters(tmp_path: Path) -> None:
+    path = tmp_path / "sweep.mat"
+    columns = np.outer(RESPONSE, [1, 2])
+    savemat(path, {"omega": FREQUENCY_HZ, "response": columns, "test": np.array(["one", "II"])}, format="4")
+    assert [test.name for test in read_sweeps(path)] == ["sweep.mat, test one", "sweep.mat, test II"]
+
+
 def test_mat_with_a_label_for_each_row(tmp_path: Path) -> None:
     path = _mat(
         tmp_path,
