@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from identification.formats.columns import FREQUENCIES, INPUTS, POLAR
@@ -38,7 +39,7 @@ OPEN = {  # what a name without a unit may mean
     "input": INPUTS,
 }
 PARTS = {"real": "real", "imag": "imag", "db": "magnitude_db", "deg": "phase_deg"}  # S21(REAL)
-PREFIXES = {"re": "real", "im": "imag", "db": "magnitude_db", "mag": "magnitude", "ang": "phase_deg"}  # re:Trc1_S21
+PREFIXES = {"re": "real", "im": "imag", "db": "magnitude_db", "mag": "magnitude", "ang": "phase_deg"}  # re:Trc1
 
 _WORD = {word: quantity for quantity, words in WORDS.items() for word in words}
 _NAME = re.compile(rf"(?:(.*?)[\s:_]+)??({'|'.join(sorted(map(re.escape, _WORD), key=len, reverse=True))})\.?")
@@ -46,7 +47,7 @@ _BRACKETED = re.compile(r"(.*?)\s*[(\[{]([^()\[\]{}]*)[)\]}]")
 _AFTER = re.compile(r"(.+?)(?:\s*/\s*|\s*,\s*|\s+in\s+|[\s_]+)(\S+)")
 _FUNCTION = re.compile(r"(re|real|im|imag|abs|arg|phi)\s*[({](.*?)[)}]\s*(?:[(\[](.*?)[)\]])?", re.IGNORECASE)
 _PARAMETER = re.compile(r"([SA]\d+)\s*\((\w+)\)", re.IGNORECASE)
-_PREFIXED = re.compile(r"(\w+):(\S+)")
+_PREFIXED = re.compile(r"(re|im|db|mag|ang)(?::|(?=Trc|Mem))(\S+)")
 _TRACE = re.compile(r"trace \d+:?\s*")
 
 
@@ -74,8 +75,8 @@ class Spelling:
 
 def spelt(name: str) -> Spelling | None:
     """What a column's name means, or None; the table of what is read, and from where, is in docs/files.md."""
-    if (found := _PREFIXED.fullmatch(name)) and found[1].lower() in PREFIXES:
-        return Spelling(found[2], PREFIXES[found[1].lower()])
+    if found := _PREFIXED.fullmatch(name):
+        return Spelling(found[2], PREFIXES[found[1]])
     if (found := _PARAMETER.fullmatch(name)) and found[2].lower() in PARTS:
         return Spelling(found[1].lower(), PARTS[found[2].lower()])
     for pattern in (_BRACKETED, _AFTER):
@@ -87,7 +88,10 @@ def spelt(name: str) -> Spelling | None:
 
 
 def _said(text: str, unit: str) -> Spelling | None:
-    """What a name and its unit say together."""
+    """What a name and its unit say together; a unit alone tells a frequency or a time."""
+    if not text:
+        alone = _of_unit(UNITS["frequency"] | UNITS["time"], unit)
+        return Spelling("", *alone) if alone else None
     if not (found := _NAME.fullmatch(text.strip().casefold())):
         return None
     label, quantity = _TRACE.sub("", found[1] or ""), _WORD[found[2]]
@@ -97,6 +101,10 @@ def _said(text: str, unit: str) -> Spelling | None:
         return Spelling(label, UNITLESS[quantity])
     if found[2] in LINEAR or (quantity == "magnitude" and "/" in unit):
         return Spelling(label, "magnitude")
-    known = UNITS.get(quantity, {})
-    ours, factor = known.get(unit.strip(), known.get(unit.strip().lower(), (None, 1.0)))
-    return Spelling(label, ours, factor, OPEN[quantity])
+    known = _of_unit(UNITS.get(quantity, {}), unit)
+    return Spelling(label, *known) if known else Spelling(label, None, may_be=OPEN[quantity])
+
+
+def _of_unit(units: Mapping[str, tuple[str, float]], unit: str) -> tuple[str, float] | None:
+    """What a unit is, in its own case where that matters (MHz, mHz), and else in any."""
+    return units.get(unit.strip(), units.get(unit.strip().lower()))

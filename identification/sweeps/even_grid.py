@@ -52,7 +52,7 @@ def on_even_grid(table: Table, *, resample: bool) -> tuple[Table, float]:
     unit = _last_digit(time_s, fitted_s) if fitted_s >= SHORTEST_S and steps.min() >= 0 else 0.0
     off = np.abs(time_s - time_s.mean() - fitted_s * centred)
     if unit and off.max() <= unit / 2 + JITTER * fitted_s and _often_rounded(steps, unit):
-        remark = f"the time stamps are rounded to {unit:.3g} s; all fit {1 / fitted_s:.9g} samples a second"
+        remark = f"the time stamps are rounded to {unit:.3g} s; all fit {1 / fitted_s:.7g} samples a second"
         return replace(table, remarks=(*table.remarks, remark)), fitted_s
     _check_order(table)
     usual = float(np.median(steps))

@@ -66,6 +66,10 @@ TEXTS: dict[str, tuple[str, str]] = {
         "# Version 1.00\n#\nfreq[Hz];re:Trc1_S21;im:Trc1_S21;\n" + _rows(F, H.real, H.imag, by=";", end=";"),
         "utf-8",
     ),
+    "R&S ZVA": (
+        "[Hz];reTrc1_S21;imTrc1_S21;\n" + _rows(F, H.real, H.imag, by=";", end=";"),
+        "utf-8",
+    ),
     "R&S ZNB, blanks": (
         "# Version 1.00\n#\nfreq[Hz] db:Trc1_S21 ang:Trc1_S21\n" + _rows(F, DB, DEG, by="   "),
         "utf-8",
