@@ -19,8 +19,8 @@ class Reading:
         For a name in the file, of a column, a variable or a field, the name of ours that it stands for, such as
         ``{"Frequency (Hz)": "frequency_hz"}``.
     node, direction
-        Of a universal file, the response's node and direction whose functions are read; None takes those of a file
-        that holds one only.
+        Of a universal file, the response's node and direction whose functions are read, or the reference's where
+        only that varies; None takes those of a file that holds one only.
     resample
         Whether a record with uneven time stamps is brought to an even grid instead of being refused.
 

@@ -12,7 +12,7 @@ from identification.base.errors import InputError
 from identification.formats.columns import COMPLEX, INPUTS, Table, quoted
 from identification.formats.reading import Reading
 from identification.formats.uff_ends import of_one_plant
-from identification.formats.uff_function import Function, read_functions
+from identification.formats.uff_function import UNDECLARED, Function, read_functions
 
 TIME_RESPONSE, COHERENCE = 1, 6
 RESPONSES = 4, 5  # of frequency, and transmissibilities
@@ -26,7 +26,6 @@ UNITS = {
     **dict.fromkeys(("hz", "hertz"), "frequency_hz"),
     **dict.fromkeys(("rad/s", "rad/sec", "rad/second"), "omega"),
 }
-UNDECLARED = ("", "none", "unknown", "null")
 NAMES = {"time_s": "s", "frequency_hz": "Hz", "omega": "rad/s"}
 EXPECTED = "expected data sets 58 of function type 4, or of type 1 with the first line input (or input_held) and output"
 
@@ -61,12 +60,14 @@ def read_uff(path: Path, reading: Reading) -> list[Table]:
         coherences = _of_kind(functions, COHERENCE)
         chosen = of_one_plant(path, responses, [response.ends for response in responses], reading)
         tests = [_response(path, response, chosen, coherences) for response in chosen]
+        remarks = [(f"the response is {each.ordinate}",) if each.ordinate else () for each in chosen]
     elif inputs or outputs:
         if len(inputs) != len(outputs):
             raise InputError(f"{path}: holds {len(inputs)} inputs and {len(outputs)} outputs; expected as many")
         pairs = [(name, one, other) for (name, one), other in zip(inputs, outputs, strict=True)]
         ends = [(other.ends[0], one.ends[0]) for _, one, other in pairs]
         tests = [_record(path, *pair) for pair in of_one_plant(path, pairs, ends, reading)]
+        remarks = [() for _ in tests]
     else:
         raise InputError(f"{path}: {_what_else(functions, signals)}; {EXPECTED}")
     return [
@@ -77,8 +78,9 @@ def read_uff(path: Path, reading: Reading) -> list[Table]:
             in_lines=False,
             test=str(k) if len(tests) > 1 else None,
             synthetic=synthetic,
+            remarks=said,
         )
-        for k, columns in enumerate(tests, 1)
+        for k, (columns, said) in enumerate(zip(tests, remarks, strict=True), 1)
     ]
 
 

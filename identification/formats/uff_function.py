@@ -23,6 +23,7 @@ from identification.formats.sizes import require_size
 
 SET = re.compile(rb"(?<![^\r\n]) {4}-1[ \t]*(?=[\r\n]|\Z)")  # stands before and after each
 END = re.compile(rb" {4}-1[ \t]*(?=[\r\n]|\Z)")  # binary data have no end of line before it
+UNDECLARED = ("", "none", "unknown", "null")  # unit
 LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\r|\n|\Z)")
 JOINED = re.compile(rb"(?<=[\d.])[-+]")  # the sign of a number that the one before leaves no blank for
 HEADER = 11  # lines, five of them text
@@ -30,6 +31,14 @@ COLUMNS = (0, 5, 15, 20, 30, 41, 51, 55, 66, 76, 80)  # of the sixth line, where
 ORDINATES = {"2": ("f4", 1), "4": ("f8", 1), "5": ("f4", 2), "6": ("f8", 2)}  # its precision, and how many make a value
 BYTE_ORDERS = {"1": "<", "2": ">"}
 IEEE = "2"
+QUANTITIES = {
+    "8": "displacement",
+    "9": "force",
+    "11": "velocity",
+    "12": "acceleration",
+    "13": "force",
+    "15": "pressure",
+}
 
 
 class End(NamedTuple):
@@ -58,6 +67,8 @@ class Function:
         The response's and the reference's.
     abscissa_unit
         As it is written.
+    ordinate
+        Which quantity over which, with their units, or nothing if the file does not say it.
     x
         (N,) abscissa.
     values
@@ -73,6 +84,7 @@ class Function:
     text: tuple[str, ...]
     ends: tuple[End, End]
     abscissa_unit: str
+    ordinate: str
     x: Real
     values: Array
 
@@ -118,7 +130,7 @@ def _function(content: bytes, number: int, position: int, binary: list[str] | No
 
     ``binary`` has what that line says of binary values.
     """
-    (*text, identity, form, abscissa, _, _, _), position = _lines(content, position, HEADER)
+    (*text, identity, form, abscissa, numerator, denominator, _), position = _lines(content, position, HEADER)
     fields = [identity[first:last] for first, last in pairwise(COLUMNS)]
     kind, rsp_node, rsp_direction, ref_node, ref_direction = (_whole(fields[k]) for k in (0, 5, 6, 8, 9))
     words = form.split()
@@ -148,7 +160,16 @@ def _function(content: bytes, number: int, position: int, binary: list[str] | No
         x = np.asarray(_real(words[3]) + _real(words[4]) * np.arange(count) if is_even else table[:, 0])
     values = np.ascontiguousarray(table[:, -2:]).view(complex)[:, 0] if parts == 2 else table[:, -1]
     ends = End(rsp_node, rsp_direction), End(ref_node, ref_direction)
-    return Function(number, kind, tuple(line.strip() for line in text), ends, abscissa[46:66].strip(), x, values), end
+    lines = tuple(line.strip() for line in text)
+    quantities = [quantity for line in (numerator, denominator) if (quantity := _quantity(line))]
+    ordinate = " over ".join(quantities) if len(quantities) == 2 else ""
+    return Function(number, kind, lines, ends, abscissa[46:66].strip(), ordinate, x, values), end
+
+
+def _quantity(line: str) -> str:
+    """What a line about an ordinate says that it is, with its unit if it names one."""
+    name, unit = QUANTITIES.get(line[:10].strip(), ""), line[46:66].strip()
+    return name and (name if unit.lower() in UNDECLARED else f"{name} in {quoted(unit)}")
 
 
 def _numbers(text: bytes) -> Iterator[float]:

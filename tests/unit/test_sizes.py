@@ -206,13 +206,18 @@ def test_a_mat_file_is_asked_its_sizes_first(sentence: str, tmp_path: Path, monk
         read_mat(path, Reading())
 
 
-def test_a_variable_that_is_not_read_may_be_large(tmp_path: Path) -> None:
+def test_a_structure_is_unpacked_where_it_is_needed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mat_level_5, "MOST_BYTES", ZEROS // 2)
     header = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x100) + b"IM"
-    members = element(5, struct.pack("<i", 8)) + bytes(4) + element(1, b"a".ljust(8, b"\0")) + element(14, HUGE)
+    members = element(5, struct.pack("<i", 8)) + element(1, b"a".ljust(8, b"\0")) + element(14, HUGE)
+    mine = packed(array(2, (1, 1), b"mine", members))
     whole = [packed(array(6, (19, 1), name, NUMBERS)) for name in (b"frequency_hz", b"real", b"imag")]
-    (tmp_path / "mine.mat").write_bytes(b"".join([header, *whole, packed(array(2, (1, 1), b"mine", members))]))
+    (tmp_path / "mine.mat").write_bytes(b"".join([header, *whole, mine]))
     (table,) = read_mat(tmp_path / "mine.mat", Reading())
     np.testing.assert_array_equal(table.columns["real"], np.arange(1.0, 20.0))
+    (tmp_path / "mine.mat").write_bytes(b"".join([header, *whole[:2], mine]))
+    with pytest.raises(InputError, match=r"mine\.mat: mine is damaged; expected a whole structure"):
+        read_mat(tmp_path / "mine.mat", Reading())
 
 
 EXTREMES = (5e-324, 1e-320, 2.3e-308, 1e-160, 1e-60, 1e-49, 1e49, 1e50, 1e160, 1e300, 1.7e308)

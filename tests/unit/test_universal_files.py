@@ -176,7 +176,9 @@ def _by_hand(ordinate: int, values: bytes, *, unit: str = "Hz", binary: str = ""
         f"{kind:5}{0:10}{1:5}{0:10} {'NONE':10}{1:10}{3:4} {'NONE':10}{2:10}{-3:4}",
         f"{ordinate:10}{9:10}{1:10}{2.0:13.5E}{0.5:13.5E}{0.0:13.5E}",
         f"{18:10}{0:5}{0:5}{0:5} {'Frequency':20} {unit:20}",
-        *[f"{12:10}{0:5}{0:5}{0:5} {'NONE':20} {'NONE':20}"] * 3,
+        f"{12:10}{0:5}{0:5}{0:5} {'Acceleration':20} {'m/s^2':20}",
+        f"{13:10}{0:5}{0:5}{0:5} {'NONE':20} {'NONE':20}",
+        f"{0:10}{0:5}{0:5}{0:5} {'NONE':20} {'NONE':20}",
     ]
     return b"    -1\n" + "".join(f"{line:80}\n" for line in header).encode() + values + b"    -1\n"
 
@@ -232,7 +234,9 @@ def test_units_of_the_abscissa(tmp_path: Path, unit: str) -> None:
     path = tmp_path / "beam.unv"
     path.write_bytes(_by_hand(6, LINES, unit=unit))
     factor = 1 if "ad/" in unit else 2 * np.pi
-    np.testing.assert_allclose(_only_test(path).omega, factor * (2 + 0.5 * np.arange(9)))
+    test = _only_test(path)
+    np.testing.assert_allclose(test.omega, factor * (2 + 0.5 * np.arange(9)))
+    assert test.remarks == ("the response is acceleration in 'm/s^2' over force",)
 
 
 def test_a_record_with_an_uneven_abscissa_and_a_name_of_its_own(tmp_path: Path) -> None:
