@@ -11,7 +11,7 @@ from itertools import islice
 
 from identification.base.errors import InputError
 from identification.formats.columns import COMPLEX, KINDS, KNOWN, choose_columns, quoted
-from identification.formats.spellings import Spelling, spelt
+from identification.formats.spellings import Spelling, factor_of, spelt
 from identification.formats.text_file import COMMENTS, declared_separator
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
@@ -83,7 +83,7 @@ def find_header(path: object, lines: Iterable[tuple[int, str]], choose: Choose) 
             sentence = f"the header holds {' and '.join(separators)}; expected one of them between the columns"
             refused.append((score, InputError(f"{place}: {sentence}")))
         above = tries
-    if in_comment:
+    if in_comment and all(score < 2 for score, _ in refused):
         return in_comment
     if not refused:
         raise InputError(f"{path}: holds no header and no numbers; expected a CSV with a header line")
@@ -99,21 +99,24 @@ def name_columns(place: str, names: Sequence[str], meant: Mapping[str, str]) -> 
         A column is missing, comes twice or lacks its unit, or the line names several responses.
     """
     ours = [meant.get(name, name) for name in names]
-    own = {name: (index, 1.0) for index, name in enumerate(ours) if name in KNOWN}
+    own = {name: (index, factor_of(names[index], name)) for index, name in enumerate(ours) if name in KNOWN}
+    spellings = [(index, said) for index, name in enumerate(ours) if name not in KNOWN and (said := spelt(name))]
     if any(kind <= set(own) for kind in KINDS):
         choose_columns(place, [name for name in ours if name in KNOWN], "columns")
-        return own
-    spellings = [(index, said) for index, name in enumerate(ours) if name not in KNOWN and (said := spelt(name))]
+        coherence = [(index, 1.0) for index, said in spellings if said == Spelling("", "coherence")]
+        return own if "coherence" in own or not coherence else own | {"coherence": coherence[0]}
     by_label: dict[str, dict[str, tuple[int, float]]] = {"": {}}
     for index, said in spellings:
         group = by_label.setdefault(said.label, {})
         if said.ours and said.ours not in own:
-            if said.ours in group and not names[index].lower().startswith("trace "):
-                both = " and ".join(quoted(names[each]) for each in (group[said.ours][0], index))
-                raise InputError(f'{place}: both {both} say {said.ours}; expected one, or --columns "NAME={said.ours}"')
             group.setdefault(said.ours, (index, said.factor))
     shared = own | by_label.pop("")
     complete = {label: test for label, group in {"": {}, **by_label}.items() if (test := _test(shared | group))}
+    for name, (first, _) in (item for test in complete.values() for item in test.items()):
+        same = [index for index, said in spellings if index > first and said == spelt(names[first])]
+        if same and not names[first].lower().startswith("trace "):
+            both = f"{quoted(names[first])} and {quoted(names[same[0]])}"
+            raise InputError(f'{place}: both {both} say {name}; expected one, or --columns "NAME={name}"')
     if "" in complete:
         return complete[""]
     if len(complete) > 1:

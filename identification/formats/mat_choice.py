@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 
 from identification.base.errors import InputError
 from identification.formats.columns import COMPLEX, INPUTS, KINDS, KNOWN, MOST_NAMES, choose_columns, quoted
 from identification.formats.mat_variable import DAMAGED, DEEPEST, NUMERIC, PLAIN, Variable
-from identification.formats.spellings import spelt
+from identification.formats.spellings import factor_of, spelt
 
 LABELS = NUMERIC | {"char", "cell"}
+MOST_STRUCTURES = 1000  # looked at; in an HDF5 file one may hold itself
 RESPONSES = {"frf", "h", "g", "resp", "tf", "p"}  # what a complex variable is called
 SIGNALS = {"u": INPUTS, "y": ("output",)}
 IN_MATLAB = {
@@ -41,18 +43,18 @@ def choose_variables(path: Path, variables: Scope, meant: Mapping[str, str]) -> 
     """
     scopes: dict[str, Scope] = {"": variables}
     if not _is_test(_found(variables)) or any("." in name for name in meant):
-        scopes = dict(_scopes(path, "", variables, 0))
+        scopes = dict(islice(_scopes(path, "", variables, 0), MOST_STRUCTURES))
     everything = {f"{prefix}{name}": each for prefix, scope in scopes.items() for name, each in scope.items()}
     translated = {name: ours for name, ours in meant.items() if name in everything}
     if translated:
         beside = {name: each for prefix in ("", *map(_prefix, translated)) for name, each in scopes[prefix].items()}
-        own = {name: (each, 1.0) for name, each in beside.items() if _is_usable(name, each)}
-        pairs = [(ours, everything[name]) for name, ours in translated.items()]
-        for (name, ours), (_, each) in zip(translated.items(), pairs, strict=True):
-            if not _is_usable(ours, each):
-                raise InputError(f"{path}: {name} is of class {each.kind}; expected numbers")
-        named = [name for name in own if name not in translated.values()] + [ours for ours, _ in pairs]
-        return _only(path, named, own | {ours: (each, 1.0) for ours, each in pairs})
+        found = {name: (each, 1.0) for name, each in beside.items() if _is_usable(name, each)}
+        others = [name for name in found if name not in translated.values()]
+        for name, ours in translated.items():
+            if not _is_usable(ours, everything[name]):
+                raise InputError(f"{path}: {name} is of class {everything[name].kind}; expected numbers")
+            found[ours] = everything[name], factor_of(name.removeprefix(_prefix(name)), ours)
+        return _only(path, [*others, *translated.values()], found)
     tests = {prefix: found for prefix, scope in scopes.items() if _is_test(found := _found(scope))}
     if len(tests) > 1 and "" not in tests:
         first = ",".join(f"{prefix}{name}={name}" for prefix, found in list(tests.items())[:1] for name in found)
@@ -87,8 +89,6 @@ def _prefix(name: str) -> str:
 def _found(scope: Scope) -> Chosen:
     """Those of our names, which come before those that say which of ours they are."""
     own = {name: (each, 1.0) for name, each in scope.items() if _is_usable(name, each)}
-    if _is_test(own):
-        return own
     complexes = [name for name, each in scope.items() if each.is_complex]
     said: dict[str, list[tuple[Variable, float]]] = {}
     for name, each in scope.items():

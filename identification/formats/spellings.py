@@ -87,6 +87,16 @@ def spelt(name: str) -> Spelling | None:
     return _said(name, "")
 
 
+def factor_of(name: str, ours: str) -> float:
+    """How many of our unit one of the unit is that a column's name gives, where ``ours`` is what it stands for."""
+    for pattern in (_BRACKETED, _AFTER):
+        if parts := pattern.fullmatch(name):
+            for units in UNITS.values():
+                if (known := _of_unit(units, parts[2])) and known[0] == ours:
+                    return known[1]
+    return 1.0
+
+
 def _said(text: str, unit: str) -> Spelling | None:
     """What a name and its unit say together; a unit alone tells a frequency or a time."""
     if not text:

@@ -20,7 +20,7 @@ CONSTANT = 1e-9  # of a signal's size
 LARGEST = 1e50  # number in a column
 MOST_POINTS = 20_000_000  # lines or samples of a test; a fit takes some 200 bytes of memory for each
 ROUNDING = 1e-4  # of a coherence outside 0 to 1
-GROWTH = 0.5  # power of omega from which on a response grows as no plant's does over a whole band
+GROWTH = 0.5  # power of omega: a response that leads and grows faster over its band is one from output to input
 
 
 def from_response(table: Table, name: str) -> FrequencyResponse:
@@ -44,18 +44,18 @@ def from_response(table: Table, name: str) -> FrequencyResponse:
         table = rows_of(table, np.argsort(values, kind="stable"))
         table = replace(table, remarks=(*table.remarks, "the lines were sorted by frequency"))
         values = table.columns[frequency]
-    if (lines := np.unique(values).size) < FEWEST_LINES:
+    omega = 2 * np.pi * values if frequency == "frequency_hz" else values
+    if (lines := np.unique(omega).size) < FEWEST_LINES:
         table.refuse(f"holds {lines} frequencies; expected {FEWEST_LINES} or more")
     coherence = table.columns.get("coherence")
     if coherence is not None:
         table.refuse_any((coherence < -ROUNDING) | (coherence > 1 + ROUNDING), "coherence", "a number from 0 to 1")
         coherence = np.clip(coherence, 0, 1)
-    omega = 2 * np.pi * values if frequency == "frequency_hz" else values
     response = _complex(table, omega)
     if not response.any():
         table.refuse("the response is 0 at every frequency; expected a plant that responds")
     excitation, remarks = None, table.remarks
-    if lines < values.size:
+    if lines < omega.size:
         omega, response, coherence, excitation, remark = _averaged(omega, response, coherence)
         remarks += (remark,)
     lead_s = lead_time(omega, response)
@@ -98,15 +98,15 @@ def _averaged(omega: Real, response: Complex, coherence: Real | None) -> tuple[R
     apart = np.divide(np.abs(response - averaged[line]), size, out=np.zeros_like(size), where=size > 0)
     scatter = np.sqrt(np.sum(apart**2) / np.sum(count - 1))
     remark = (
-        f"{np.count_nonzero(count > 1)} of {at.size} frequencies hold several readings, which were averaged; one "
-        f"scatters by {100 * scatter:.2g} %"
+        f"{np.count_nonzero(count > 1)} of {at.size} frequencies hold several readings, which were averaged; a "
+        f"single one scatters by {100 * scatter:.2g} %"
     )
     excitation = np.median(count) / count
     return at, averaged, None if coherence is None else mean(coherence), excitation, remark
 
 
 def _grows(omega: Real, response: Complex) -> bool:
-    """Whether the response grows over the band as that of no plant does, so that it is one from output to input."""
+    """Whether the response grows over its band faster than by the power GROWTH of omega."""
     lines = np.flatnonzero(response)
     slope = np.polyfit(np.log(omega[lines]), np.log(np.abs(response[lines])), 1)[0]
     return bool(slope > GROWTH)

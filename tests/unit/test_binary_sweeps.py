@@ -141,8 +141,8 @@ EXPECTED = (
             ": 'Omega' does not say which quantity in which unit; expected --columns \"Omega=omega\"",
         ),
         (
-            {"omega": 1, "response": 1j, "Coherence": 1},
-            ": one of the variables is 'Coherence'; expected 'coherence' or another name",
+            {"omega": 1, "response": 1j, "Test": 1},
+            ": one of the variables is 'Test'; expected 'test' or another name",
         ),
         (
             {"f": 1, "mag": 1, "phase": 1},
@@ -248,6 +248,10 @@ STRUCTURES: list[tuple[dict[str, Any], dict[str, str]]] = [
     ({"d": {"f": FREQUENCY_HZ, "frf": RESPONSE}}, {"d.f": "omega", "d.frf": "response", "Other (Hz)": "frequency_hz"}),
     ({"d": {"f": FREQUENCY_HZ, "response": RESPONSE}, "e": {"response": 1j}}, {"d.f": "omega"}),
     ({"f": FREQUENCY_HZ, "omega": 1, "d": {"frf": RESPONSE, "omega": 2}}, {"f": "omega", "d.frf": "response"}),
+    (
+        {"d": {"w_krad": 1, "f_kHz": FREQUENCY_HZ / (2e3 * np.pi), "frf": RESPONSE}},
+        {"d.f_kHz": "frequency_hz", "d.frf": "response"},
+    ),
     ({"w_rad_s": FREQUENCY_HZ, "FRF": RESPONSE}, {}),
     ({"f_Hz": FREQUENCY_HZ / (2 * np.pi), "H": RESPONSE}, {}),
     ({"freq_kHz": FREQUENCY_HZ / (2e3 * np.pi), "real": RESPONSE.real, "imag": RESPONSE.imag, "H": [1j, 2]}, {}),
@@ -368,6 +372,13 @@ def test_mat_of_version_7_3(tmp_path: Path) -> None:
     with h5py.File(path.rename(tmp_path / "sweep.data"), "w") as file:
         file.update({"frequency_hz": FREQUENCY_HZ, "response": RESPONSE})
     np.testing.assert_array_equal(_only_test(tmp_path / "sweep.data").response, RESPONSE)
+
+
+def test_mat_of_version_7_3_with_a_structure_in_itself(tmp_path: Path) -> None:
+    path = _hdf5(tmp_path, s={"omega": FREQUENCY_HZ})
+    with h5py.File(path, "r+") as file:
+        file["s"].update({str(k): file["s"] for k in range(10)})
+    assert _refusal(path).startswith(": the variables are 's (struct)', 's.omega', 's.0 (struct)'")
 
 
 def test_mat_of_version_7_3_with_an_object(tmp_path: Path) -> None:

@@ -328,7 +328,9 @@ def _read_or_refused_in_one_line(path: Path) -> bool:
     return True
 
 
-HEADERS = st.sampled_from(["", FRF[0], RAW[0], TWO[0], "omega;magnitude;phase_rad", "frequency_hz,real,imag"])
+HEADERS = st.sampled_from(
+    ["", FRF[0], RAW[0], TWO[0], "omega;magnitude;phase_rad", "# f/kHz, Re(H), Im(H)", "frequency_hz,x,response"]
+)
 CELL = st.one_of(st.floats().map(repr), st.integers().map(str), st.text(max_size=5), st.just(""))
 
 

@@ -88,6 +88,11 @@ TEXTS: dict[str, tuple[str, str]] = {
     "wide blanks": ("Frequency (Hz)   Gain (dB)   Phase (deg)\n" + _rows(F, DB, DEG, by="  "), "utf-8"),
     "units below": ("Frequency,Gain,Phase\nHz,dB,deg\n" + POLAR, "utf-8"),
     "more than is read": ("frequency_hz,real,imag,Gain (dB),Time\n" + _rows(F, H.real, H.imag, DB, F), "utf-8"),
+    "the same twice": (
+        "Frequency (Hz),Re(H),Im(H),Gain (dB),Magnitude (dB)\n" + _rows(F, H.real, H.imag, DB, DB),
+        "utf-8",
+    ),
+    "a comment that is no header": ("# frequency_hz, imag, real\nf/Hz,Re(H),Im(H)\n" + CARTESIAN, "utf-8"),
     # signs and encodings
     "UTF-16": ("frequency_hz\treal\timag\n" + _rows(F, H.real, H.imag, by="\t"), "utf-16"),
     "cp1252": ("# Prüfstand, 20 °C\nfrequency_hz,real,imag\n" + CARTESIAN, "cp1252"),
@@ -137,6 +142,11 @@ def test_columns_are_named_by_the_user(tmp_path: Path) -> None:
     test = _read(tmp_path, text, f="frequency_hz", Txy="response", real="coherence")
     np.testing.assert_allclose(test.response, H, rtol=1e-12)
     np.testing.assert_array_equal(test.coherence, 0 * F)
+    lag = "Stimulus no. 1 (kHz),Lag of y (rad),Level\n" + _rows(F / 1e3, RAD, SIZE)
+    chosen = {"Stimulus no. 1 (kHz)": "frequency_hz", "Lag of y (rad)": "phase_rad", "Level": "magnitude"}
+    test = _read(tmp_path, lag, **chosen)
+    np.testing.assert_allclose(test.omega, 2 * np.pi * F, rtol=1e-12)
+    np.testing.assert_allclose(test.response, H, rtol=1e-12)
     header = "Frequency(Hz),CH1 Amplitude(dB),CH1 Phase(Deg),CH2 Amplitude(dB),CH2 Phase(Deg)\n"
     both = header + _rows(F, DEG, DB, DB, DEG)
     chosen = {"CH2 Amplitude(dB)": "magnitude_db", "CH2 Phase(Deg)": "phase_deg"}
@@ -175,6 +185,12 @@ def test_columns_are_named_by_the_user(tmp_path: Path) -> None:
             "frequency_hz;real;imag\n" + SEMICOLONS.replace(".", ",").replace("1,0;", "1.0;", 1),
             {},
             f", line 2: real is '{str(H.real[0]).replace('.', ',')}'; expected a finite number with a decimal point",
+        ),
+        (
+            "# frequency_hz, imag, real\nFrequency,Re(H),Im(H)\n" + CARTESIAN,
+            {},
+            ", line 2: the header leaves open whether 'Frequency' is frequency_hz or omega; expected a unit in "
+            'brackets, or --columns "Frequency=frequency_hz" or its like',
         ),
         ("frequency_hz\x00,real,imag\n" + CARTESIAN, {}, None),
     ],
@@ -229,7 +245,7 @@ def test_readings_at_one_frequency_are_averaged(tmp_path: Path) -> None:
     np.testing.assert_allclose(test.excitation * count, np.full(F.size, test.excitation[0]), rtol=1e-12)
     np.testing.assert_array_equal(test.coherence, 0 * F + 0.5)
     (remark,) = test.remarks
-    said = "6 of 12 frequencies hold several readings, which were averaged; one scatters by "
+    said = "6 of 12 frequencies hold several readings, which were averaged; a single one scatters by "
     assert remark.startswith(said)
     assert float(remark.removeprefix(said).removesuffix(" %")) == pytest.approx(5, abs=0.5)
 
@@ -237,7 +253,7 @@ def test_readings_at_one_frequency_are_averaged(tmp_path: Path) -> None:
 def test_a_coherence_that_is_rounded_or_unknown_rejects_nothing(tmp_path: Path) -> None:
     coherence = ["1.0000001", "nan", "NaN", "", "-1e-9", *["0.5"] * 7]
     rows = "".join(f"{row},{c}\n" for row, c in zip(CARTESIAN.splitlines(), coherence, strict=True))
-    test = _read(tmp_path, "frequency_hz,real,imag,coherence\n" + rows)
+    test = _read(tmp_path, "frequency_hz,real,imag,Coherence\n" + rows)
     np.testing.assert_array_equal(test.coherence, [1, np.nan, np.nan, np.nan, 0, *[0.5] * 7])
 
 
