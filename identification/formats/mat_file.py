@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -103,16 +104,21 @@ def _variables(path: Path) -> Iterator[dict[str, Variable]]:
 
 def _of_level_4(path: Path) -> Iterator[tuple[str, Variable]]:
     """The names and variables of a file of level 4, MATLAB's -v4, which holds no structures."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", UserWarning)  # of numbers as no machine has them any more
-        listed = whosmat(str(path), appendmat=False)
-    for name, shape, kind in listed:
+    for name, shape, kind in _scipy(lambda: whosmat(str(path), appendmat=False)):
         yield name, Variable(kind, shape, False, partial(_level_4_values, path, name), nothing)
 
 
 def _level_4_values(path: Path, name: str) -> Array:
-    read = loadmat(str(path), appendmat=False, variable_names=[name], chars_as_strings=False)
+    read = _scipy(lambda: loadmat(str(path), appendmat=False, variable_names=[name], chars_as_strings=False))
     return np.asarray(read[name])
+
+
+def _scipy(read: Callable[[], Any]) -> Any:
+    """What scipy reads, which warns of sizes and numbers that no file has."""
+    with warnings.catch_warnings():
+        for each in (UserWarning, RuntimeWarning):
+            warnings.simplefilter("error", each)
+        return read()
 
 
 def _read(path: Path, name: str, variable: Variable, factor: float) -> Array:

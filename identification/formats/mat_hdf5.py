@@ -65,22 +65,28 @@ def _usual_class(dtype: np.dtype[Any]) -> str:
 
 
 def _values(item: h5py.Dataset, kind: str) -> Array:
-    lengths = (item.size, math.prod(item.chunks or ()))
+    lengths = [math.prod(map(int, shape)) for shape in (item.shape, item.chunks or ())]
     if item.is_virtual or item.external or max(lengths) * item.dtype.itemsize > MOST_BYTES:
         raise ValueError
     if "MATLAB_empty" in item.attrs:
         return np.zeros((0, 0))
     if kind == "cell":
-        if item.size > MOST_CELLS:
+        if lengths[0] > MOST_CELLS:
             raise ValueError
-        cells = np.fromiter((_variable(item.file[each]).read() for each in item[()].ravel()), dtype=object)
-        return cells.reshape(item.shape).T
+        held = [item.file[each] for each in item[()].ravel()]
+        if any(isinstance(each, h5py.Group) or each.dtype.kind == "O" for each in held):  # no labels
+            raise ValueError
+        return np.fromiter((_variable(each).read() for each in held), dtype=object).reshape(item.shape).T
     if item.dtype.kind not in "biufc" and item.dtype.names != ("real", "imag"):
         raise ValueError
     values: Array = item[()].T
     if kind == "char":
         return np.array([chr(each) for each in values.ravel()], dtype="U1").reshape(values.shape)
-    return values["real"] + 1j * values["imag"] if item.dtype.names else values
+    if not item.dtype.names:
+        return values
+    pairs = np.empty(values.shape, dtype=complex)
+    pairs.real, pairs.imag = values["real"], values["imag"]
+    return pairs
 
 
 def _nothing_to_read() -> Array:

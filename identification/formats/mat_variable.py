@@ -16,7 +16,7 @@ PLAIN = NUMERIC | {"char", "cell", "struct", "sparse", "function_handle"}
 DEEPEST = 8  # structures within structures
 DAMAGED = (
     *(ValueError, TypeError, LookupError, AttributeError, OverflowError, RecursionError, RuntimeError),
-    *(OSError, NotImplementedError, struct.error, zlib.error, MatReadError, UserWarning),
+    *(OSError, NotImplementedError, struct.error, zlib.error, MatReadError, UserWarning, RuntimeWarning),
 )
 """What reading a damaged file raises."""
 

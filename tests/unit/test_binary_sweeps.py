@@ -17,6 +17,7 @@ from sweep_columns import COLUMNS as SHARED
 from sweep_columns import FREQUENCY_HZ, RESPONSE, require_sentence_after_damage
 
 from identification.base.errors import InputError
+from identification.formats import mat_choice
 from identification.formats.reading import Reading
 from identification.sweeps.read_sweeps import read_sweeps
 from identification.sweeps.response import FrequencyResponse
@@ -374,11 +375,12 @@ def test_mat_of_version_7_3(tmp_path: Path) -> None:
     np.testing.assert_array_equal(_only_test(tmp_path / "sweep.data").response, RESPONSE)
 
 
-def test_mat_of_version_7_3_with_a_structure_in_itself(tmp_path: Path) -> None:
+def test_mat_of_version_7_3_with_a_structure_in_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mat_choice, "MOST_STRUCTURES", 50)
     path = _hdf5(tmp_path, s={"omega": FREQUENCY_HZ})
     with h5py.File(path, "r+") as file:
         file["s"].update({str(k): file["s"] for k in range(10)})
-    assert _refusal(path).startswith(": the variables are 's (struct)', 's.omega', 's.0 (struct)'")
+    assert _refusal(path).startswith(": the variables are 's (struct)', 's.0 (struct)', 's.1 (struct)'")
 
 
 def test_mat_of_version_7_3_with_an_object(tmp_path: Path) -> None:
