@@ -14,13 +14,14 @@ from identification.base.arrays import Array
 from identification.formats.mat_variable import Variable, nothing
 from identification.formats.sizes import MOST_BYTES
 
-BEGINNINGS = b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+USER_BLOCK = 512  # bytes, in which MATLAB writes a head as of level 5
 MOST_CELLS = 100_000
 
 
 def is_hdf5(content: bytes) -> bool:
     """Whether a file's first bytes say that it is an HDF5 file, of MATLAB or of another program."""
-    return content.startswith(BEGINNINGS)
+    return content.startswith((SIGNATURE, b"MATLAB 7.3")) or content.startswith(SIGNATURE, USER_BLOCK)
 
 
 def read_variables(file: h5py.File) -> Iterator[tuple[str, Variable]]:

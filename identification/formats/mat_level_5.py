@@ -105,7 +105,7 @@ def _variable(body: memoryview, order: str, packed: memoryview | None = None) ->
     is_complex = bool(flags & IS_COMPLEX)
     whole = partial(_whole, body, order, packed, flags & 0xFF, math.prod(shape))
     return _text(name_bytes), Variable(
-        "logical" if flags & IS_LOGICAL else kind,
+        "logical" if flags & IS_LOGICAL and flags & 0xFF in NUMBERS else kind,
         shape,
         is_complex,
         lambda: _values(whole(), order, flags & 0xFF, shape, is_complex),

@@ -27,7 +27,10 @@ UNITS = {
     **dict.fromkeys(("rad/s", "rad/sec", "rad/second"), "omega"),
 }
 NAMES = {"time_s": "s", "frequency_hz": "Hz", "omega": "rad/s"}
-EXPECTED = "expected data sets 58 of function type 4, or of type 1 with the first line input (or input_held) and output"
+EXPECTED = (
+    "expected data sets 58 of function type 4, or of type 1 with the first line input (or input_held) and output, "
+    "or --columns NAME=OURS for that line"
+)
 
 
 def read_uff(path: Path, reading: Reading) -> list[Table]:

@@ -328,7 +328,7 @@ def _hdf5(tmp_path: Path, **variables: Any) -> Path:
         for name, value in variables.items():
             _put(file, name, value)
     with path.open("r+b") as raw:
-        raw.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+        raw.write(b"MATLAB 7.0 MAT-file".ljust(124) + b"\x00\x02IM")
     return path
 
 

@@ -116,7 +116,8 @@ def test_uff_raw_records(tmp_path: Path) -> None:
 
 
 EXPECTED_58 = (
-    "expected data sets 58 of function type 4, or of type 1 with the first line input (or input_held) and output"
+    "expected data sets 58 of function type 4, or of type 1 with the first line input (or input_held) and output, "
+    "or --columns NAME=OURS for that line"
 )
 OTHER_ABSCISSA = ", data set 2: the abscissa is another than that of data set 1; expected the same"
 
