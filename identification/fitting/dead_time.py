@@ -45,7 +45,7 @@ def group_delay(omega: Real, response: Complex) -> float:
     step = np.diff(omega)
     increment = np.angle(response[1:] * response[:-1].conj())
     finest = 0.25 / np.max(step)
-    delays = np.arange(0.0, min(_turn(omega), MOST_DELAYS * finest), finest)
+    delays = np.arange(0.0, min(turn_of(omega), MOST_DELAYS * finest), finest)
     votes = np.zeros(delays.size)
     for block in np.array_split(np.arange(delays.size), 1 + delays.size * step.size // 500_000):
         votes[block] = np.cos(increment + delays[block, None] * step).sum(axis=1)
@@ -62,9 +62,9 @@ def likely_delays(omega: Real, response: Complex) -> Real:
     """
     spacing = spacing_of(omega)
     more = MORE_TURNS if spacing is not None and same_turn(omega) is None else 0
-    return np.asarray(group_delay(omega, response) + np.arange(-1, more + 1) * _turn(omega))
+    return np.asarray(group_delay(omega, response) + np.arange(-1, more + 1) * turn_of(omega))
 
 
-def _turn(omega: Real) -> float:
+def turn_of(omega: Real) -> float:
     """The dead time in seconds that turns the phase once from one of most lines (M,) to the next."""
     return 2 * np.pi / float(np.quantile(np.diff(omega), 0.1))

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.polynomial import Polynomial, chebyshev
 
 from identification.base.arrays import Complex, Real
-from identification.fitting.dead_time import likely_delays
+from identification.fitting.dead_time import likely_delays, turn_of
 from identification.model.structure import Structure
 
 ITERATIONS = 8
 UNTHREADED = 100_000  # multiplications of a matrix product; threads cost more than they bring at this size
+TURNS = 0.2  # cost a line that a dead time of a turn or more has to gain
 LEAST_ZETA = 1e-5  # of a mode
 APART = 1.05  # least zeta of a mode that is written as two real roots
 BAND = 10.0  # modes are sought up to this factor outside the band
@@ -45,7 +46,8 @@ def guesses(omega: Real, response: Complex, sigma: Real, structure: Structure, k
     j omega apart). Poles in the right half plane are reflected, and zeros are as far as the structure has fewer there.
     """
     delays, costs, best, _ = _rational_fits(omega, response, sigma, structure)
-    order = np.argsort(costs)[:keep]
+    # dead times of a turn or more are tried only where shorter ones fail: noise must not choose among turns
+    order = np.argsort(costs + TURNS * omega.size * (delays >= turn_of(omega)))[:keep]
     return [_guess(structure, best[k], delays[k], omega[-1], omega) for k in order]
 
 

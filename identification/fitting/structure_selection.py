@@ -98,17 +98,20 @@ class Selection:
         return max(1.0, float(np.median(small)) / SUPERFLUOUS) if small.size > 1 else 1.0
 
     def _climb(self, best: Structure) -> Structure:
-        """Single steps from ``best`` as long as the criterion falls."""
+        """Single steps from ``best`` as long as the criterion falls.
+
+        Where it hardly tells on which side of the axis zeros lie, they lie on the left.
+        """
         tried = {best}
         while True:
             better, is_white = best, self.white(best)
             for step in neighbours(best):
                 if step in tried or not self._affordable(step) or not self.wanted.admits(step):
                     continue
-                if is_white and step.degrees != best.degrees and step.free == best.free:
-                    continue  # a mirrored zero explains noise as well as it was explained
+                if is_white and step.right > best.right:
+                    continue  # noise cannot ask for a zero in the right half plane
                 tried.add(step)
-                if self._step(best, step) and self.criterion(step) < self.criterion(better):
+                if self._step(best, step) and self._preference(step) < self._preference(better):
                     better = step
             if better == best:
                 better = self._shed(best, tried)
@@ -121,6 +124,9 @@ class Selection:
         if not self.wanted.admits(structure):
             return np.inf
         return sum(map(self._criterion_of, range(len(self.tests)), self.fits[structure]))
+
+    def _preference(self, structure: Structure) -> float:
+        return self.criterion(structure) + ALIKE * structure.right
 
     def white(self, structure: Structure) -> bool:
         """Whether a structure leaves nothing to explain in any test."""
