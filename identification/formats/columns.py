@@ -18,6 +18,7 @@ POLAR = (("magnitude_db", "magnitude"), ("phase_deg", "phase_rad"))
 CARTESIAN = ("real", "imag")
 COMPLEX = "response"
 FREQUENCIES = ("frequency_hz", "omega")
+FIRST = (*FREQUENCIES, "time_s")
 INPUTS = ("input", "input_held")
 OF_RESPONSE = {*FREQUENCIES, *POLAR[0], *POLAR[1], *CARTESIAN, COMPLEX, "coherence"}
 OF_RECORD = {"time_s", *INPUTS, "output"}
@@ -139,7 +140,7 @@ def choose_columns(place: str, names: Sequence[str], noun: str) -> list[str]:
             "or frequency_hz, real, imag or frequency_hz, response or time_s, input, output "
             "(or omega, magnitude, phase_rad, input_held in their place), or --columns NAME=OURS"
         )
-    return sorted(chosen, key=lambda name: name not in (*FREQUENCIES, "time_s"))
+    return sorted(chosen, key=lambda name: name not in FIRST)
 
 
 def rows_of(table: Table, rows: Whole) -> Table:

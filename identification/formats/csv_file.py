@@ -13,7 +13,7 @@ import numpy as np
 
 from identification.base.arrays import Array
 from identification.base.errors import InputError
-from identification.formats.columns import COMPLEX, FREQUENCIES, Table, quoted, split_tests
+from identification.formats.columns import COMPLEX, FIRST, FREQUENCIES, Table, quoted, split_tests
 from identification.formats.header import BLANKS, WIDE_BLANKS, Choose, Header, find_header, name_columns, split_fields
 from identification.formats.reading import Reading
 from identification.formats.sizes import require_size
@@ -44,8 +44,7 @@ def read_columns(path: Path, choose: Choose) -> list[Table]:
     require_size(path)
     text = read_any_text(path)
     header = find_header(path, text_lines(text), choose)
-    first = (*FREQUENCIES, "time_s")
-    wanted = sorted(header.columns.items(), key=lambda each: each[0] not in first)
+    wanted = sorted(header.columns.items(), key=lambda each: each[0] not in FIRST)
     test = header.columns["test"][0] if "test" in header.columns else None
     columns = [(name, column, array("d")) for name, (column, _) in wanted if name != "test"]
     commas = _has_decimal_commas(path, text, header)

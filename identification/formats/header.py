@@ -6,12 +6,12 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 
 from identification.base.errors import InputError
-from identification.formats.columns import COMPLEX, KINDS, KNOWN, choose_columns, quoted
-from identification.formats.spellings import Spelling, factor_of, spelt
+from identification.formats.columns import COMPLEX, FIRST, KINDS, KNOWN, choose_columns, quoted
+from identification.formats.spellings import Spelling, factor_of, size_of, spelt
 from identification.formats.text_file import COMMENTS, declared_separator
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
@@ -60,6 +60,7 @@ def find_header(path: object, lines: Iterable[tuple[int, str]], choose: Choose) 
     in_comment: Header | None = None
     declared = None
     above: dict[str, list[str]] = {}
+    lines = iter(lines)
     for number, line in islice(lines, MOST_LINES):
         if declared is None and (declared := declared_separator(line)):
             continue
@@ -73,13 +74,13 @@ def find_header(path: object, lines: Iterable[tuple[int, str]], choose: Choose) 
                     header = Header(number, separator, each, choose(place, each))
                 except InputError as error:
                     if not is_comment and each is names:
-                        refused.append((sum(name in KNOWN or spelt(name) is not None for name in names), error))
+                        refused.append((_likeness(names), error))
                     continue
                 if not is_comment:
-                    return header
+                    return _with_units_below(path, header, next(lines, None))
                 in_comment = in_comment or header
         separators = [SEPARATORS[separator] for separator in tries if separator in SEPARATORS]
-        if len(separators) > 1 and not is_comment and (score := max(each for each, _ in refused[-len(tries) :])):
+        if len(separators) > 1 and not is_comment and (score := max(each for each, _ in refused[-len(tries) :])) > 0:
             sentence = f"the header holds {' and '.join(separators)}; expected one of them between the columns"
             refused.append((score, InputError(f"{place}: {sentence}")))
         above = tries
@@ -149,9 +150,29 @@ def _require_units(place: str, names: Sequence[str], found: Columns, unsaid: Seq
         )
 
 
+def _likeness(names: Sequence[str]) -> int:
+    """How many names of a line a test may have; a line of units is less than one of none."""
+    if any(size_of(names[0], first) for first in FIRST):
+        return -1
+    return sum(name in KNOWN or spelt(name) is not None for name in names)
+
+
 def _with_units(names: list[str], units: list[str]) -> list[str]:
     """The names of one line with the units that the next one gives, if it gives as many."""
     return [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=False)]
+
+
+def _with_units_below(path: object, header: Header, below: tuple[int, str] | None) -> Header:
+    """The header with the units of the next line, if that begins with a unit of its first column."""
+    if below is None or _is_numbers(below[1]):
+        return header
+    number, line = below
+    fields = dict(enumerate(split_fields(f"{path}, line {number}", line, header.separator)))
+    sizes = {name: size_of(fields.get(index, ""), name) for name, (index, _) in header.columns.items()}
+    if not any(sizes.get(name) for name in FIRST):
+        return header
+    columns = {name: (index, sizes[name] or factor) for name, (index, factor) in header.columns.items()}
+    return replace(header, line=number, columns=columns)
 
 
 def _separated(place: str, line: str, declared: str | None) -> dict[str, list[str]]:
@@ -161,7 +182,7 @@ def _separated(place: str, line: str, declared: str | None) -> dict[str, list[st
     for names in tries.values():
         while names and not names[-1]:
             names.pop()
-    return tries
+    return {separator: names for separator, names in tries.items() if names}
 
 
 def _is_numbers(line: str) -> bool:

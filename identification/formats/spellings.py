@@ -89,12 +89,14 @@ def spelt(name: str) -> Spelling | None:
 
 def factor_of(name: str, ours: str) -> float:
     """How many of our unit one of the unit is that a column's name gives, where ``ours`` is what it stands for."""
-    for pattern in (_BRACKETED, _AFTER):
-        if parts := pattern.fullmatch(name):
-            for units in UNITS.values():
-                if (known := _of_unit(units, parts[2])) and known[0] == ours:
-                    return known[1]
-    return 1.0
+    units = [parts[2] for pattern in (_BRACKETED, _AFTER) if (parts := pattern.fullmatch(name))]
+    return next((factor for unit in units if (factor := size_of(unit, ours)) is not None), 1.0)
+
+
+def size_of(unit: str, ours: str) -> float | None:
+    """How many of the unit of a name of ours a unit is, or None where it is none of that name."""
+    known = [found for units in UNITS.values() if (found := _of_unit(units, unit)) and found[0] == ours]
+    return known[0][1] if known else None
 
 
 def _said(text: str, unit: str) -> Spelling | None:

@@ -27,6 +27,10 @@ def _rows(*columns: np.ndarray, by: str = ",", end: str = "") -> str:
 CARTESIAN = _rows(F, H.real, H.imag)
 POLAR = _rows(F, DB, DEG)
 SEMICOLONS = _rows(F, H.real, H.imag, by=";")
+KINDS = (
+    "expected frequency_hz, magnitude_db, phase_deg or frequency_hz, real, imag or frequency_hz, response "
+    "or time_s, input, output (or omega, magnitude, phase_rad, input_held in their place), or --columns NAME=OURS"
+)
 COMPLEX = [f"{z.real:.17g}{z.imag:+.17g}" for z in H]
 BODE_100 = (
     'Frequency (Hz);"Trace 1: Gain: Real ";"Trace 1: Gain: Imaginary ";Trace 1: Gain: Magnitude (dB);'
@@ -87,6 +91,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "capitals": ("Frequency_Hz,Real,Imag\n" + CARTESIAN, "utf-8"),
     "wide blanks": ("Frequency (Hz)   Gain (dB)   Phase (deg)\n" + _rows(F, DB, DEG, by="  "), "utf-8"),
     "units below": ("Frequency,Gain,Phase\nHz,dB,deg\n" + POLAR, "utf-8"),
+    "units below our names": ("frequency_hz,real,imag\nkHz,V/V,V/V\n" + _rows(F / 1e3, H.real, H.imag), "utf-8"),
     "more than is read": ("frequency_hz,real,imag,Gain (dB),Time\n" + _rows(F, H.real, H.imag, DB, F), "utf-8"),
     "the same twice": (
         "Frequency (Hz),Re(H),Im(H),Gain (dB),Magnitude (dB)\n" + _rows(F, H.real, H.imag, DB, DB),
@@ -147,6 +152,11 @@ def test_columns_are_named_by_the_user(tmp_path: Path) -> None:
     test = _read(tmp_path, lag, **chosen)
     np.testing.assert_allclose(test.omega, 2 * np.pi * F, rtol=1e-12)
     np.testing.assert_allclose(test.response, H, rtol=1e-12)
+    scope = "x-axis,1,2,3\nkHz,V,V,V\n" + _rows(F / 1e3, DB, H.imag, H.real)
+    chosen = {"x-axis": "frequency_hz", "3": "real", "2": "imag"}
+    test = _read(tmp_path, scope, **chosen)
+    np.testing.assert_allclose(test.omega, 2 * np.pi * F, rtol=1e-12)
+    np.testing.assert_array_equal(test.response, H)
     header = "Frequency(Hz),CH1 Amplitude(dB),CH1 Phase(Deg),CH2 Amplitude(dB),CH2 Phase(Deg)\n"
     both = header + _rows(F, DEG, DB, DB, DEG)
     chosen = {"CH2 Amplitude(dB)": "magnitude_db", "CH2 Phase(Deg)": "phase_deg"}
@@ -192,6 +202,7 @@ def test_columns_are_named_by_the_user(tmp_path: Path) -> None:
             ", line 2: the header leaves open whether 'Frequency' is frequency_hz or omega; expected a unit in "
             'brackets, or --columns "Frequency=frequency_hz" or its like',
         ),
+        ("x-axis,1\nsecond,Volt\n" + _rows(F, DB), {}, f", line 1: the columns are 'x-axis', '1'; {KINDS}"),
         ("frequency_hz\x00,real,imag\n" + CARTESIAN, {}, None),
     ],
 )
