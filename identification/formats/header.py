@@ -100,10 +100,6 @@ def name_columns(place: str, names: Sequence[str], meant: Mapping[str, str]) -> 
         A column is missing, comes twice or lacks its unit, or the line names several responses.
     """
     ours = [meant.get(name, name) for name in names]
-    if unknown := sorted({*meant.values()} - KNOWN):
-        raise InputError(
-            f"--columns: {quoted(unknown[0])} is no name of ours; expected one of {', '.join(sorted(KNOWN))}"
-        )
     own = {name: (index, factor_of(names[index], name)) for index, name in enumerate(ours) if name in KNOWN}
     spellings = [(index, said) for index, name in enumerate(ours) if name not in KNOWN and (said := spelt(name))]
     if any(kind <= set(own) for kind in KINDS):

@@ -24,7 +24,7 @@ SECONDS = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "us"
 DEGREES, RADIANS = ("deg", "degree", "degrees", "°", "º"), ("rad", "radian", "radians")
 UNITS = {  # of a quantity: which name of ours it makes, and how many of our unit it is
     "frequency": {unit: ("frequency_hz", size) for unit, size in HERTZ.items()}
-    | dict.fromkeys(("rad/s", "rad/sec", "1/s"), ("omega", 1.0)),
+    | dict.fromkeys(("rad/s", "rad/sec", "rad_s", "1/s"), ("omega", 1.0)),
     "magnitude": {"db": ("magnitude_db", 1.0)} | dict.fromkeys(("abs", "lin", "linear", "u"), ("magnitude", 1.0)),
     "phase": dict.fromkeys(DEGREES, ("phase_deg", 1.0)) | dict.fromkeys(RADIANS, ("phase_rad", 1.0)),
     "time": {unit: ("time_s", size) for unit, size in SECONDS.items()},

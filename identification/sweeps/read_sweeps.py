@@ -9,6 +9,7 @@ from pathlib import Path
 from identification.base.errors import InputError, printable
 from identification.base.files import is_folder, require_readable, true_path
 from identification.formats.csv_file import read_csv
+from identification.formats.first_bytes import usual_suffix
 from identification.formats.mat_file import read_mat
 from identification.formats.reading import Reading
 from identification.formats.uff_file import read_uff
@@ -20,7 +21,7 @@ KEPT = ".npz"
 READERS = {
     **dict.fromkeys((".csv", ".tsv", ".lvm"), read_csv),
     ".mat": read_mat,
-    **dict.fromkeys((".uff", ".unv", ".58"), read_uff),
+    **dict.fromkeys((".uff", ".unv", ".ufb", ".58"), read_uff),
 }
 
 
@@ -53,12 +54,12 @@ def read_sweeps(paths: Path | str | Sequence[Path | str], reading: Reading | Non
 
     A file that ends in .npz holds responses that were estimated before, see
     :mod:`identification.sweeps.kept_responses`; they keep their names and the paths that they came from. Every other
-    file holds frequency responses or raw records: a MAT file if its name ends in .mat, a universal file if it ends
-    in .uff, .unv or .58, and else a CSV. Its columns, in a MAT file its variables, say what they are by their names:
-    frequency_hz or omega (rad/s); magnitude_db or magnitude, with phase_deg or phase_rad; or real, imag; or response,
-    which is complex; and coherence if there is one. A raw record has time_s, output, and input (band-limited like the
-    output before both are sampled) or input_held (the command of a converter that holds it for one interval). A column
-    ``test`` tells several tests apart. A CSV may also spell its columns as other tools do, see
+    file holds frequency responses or raw records: a MAT or universal file if it begins as such a file does, or its
+    name ends in .mat, .uff, .unv, .ufb or .58, and else a CSV. Its columns, in a MAT file its variables, say what
+    they are by their names: frequency_hz or omega (rad/s); magnitude_db or magnitude, with phase_deg or phase_rad;
+    or real, imag; or response, which is complex; and coherence if there is one. A raw record has time_s, output, and
+    input (band-limited like the output before both are sampled) or input_held (the command of a converter that holds
+    it for one interval). A column ``test`` tells several tests apart. They may also be spelt as other tools do, see
     :mod:`identification.formats.spellings`. See :mod:`identification.sweeps.from_table` for what becomes of a table.
 
     A test with the frequencies and the response of one before is the same measurement and is left out, with a remark
@@ -78,7 +79,8 @@ def read_sweeps(paths: Path | str | Sequence[Path | str], reading: Reading | Non
         if file.suffix.lower() == KEPT:
             tests += read_responses(file)
             continue
-        for table in READERS.get(file.suffix.lower(), read_csv)(file, reading):
+        suffix = usual_suffix(file) or file.suffix.lower()
+        for table in READERS.get(suffix, read_csv)(file, reading):
             label = name if table.test is None else f"{name}, test {table.test}"
             is_record = "time_s" in table.columns
             tests.append(
