@@ -51,6 +51,8 @@ def fit_model(
     *,
     soft: bool = False,
     bound_order: int = 2,
+    bound_below: float | None = None,
+    bound_above: float | None = None,
     seed: int = 0,
     tick: Tick = lambda: None,
 ) -> ModelFit:
@@ -60,8 +62,9 @@ def fit_model(
     ----------
     tests, wanted, soft, seed, tick
         As for :func:`identification.fitting.fit_plant.fit_plant`.
-    bound_order
-        Number of poles of W_a, see :func:`identification.bound.bound_residuals.bound_residuals`.
+    bound_order, bound_below, bound_above
+        Number of poles of W_a, and levels that it covers beyond the lines, see
+        :func:`identification.bound.bound_residuals.bound_residuals`.
 
     Raises
     ------
@@ -72,7 +75,7 @@ def fit_model(
     plants = [test.plant for test in result.tests]
     checks = _checks(tests, plants, tick)
     clean = tuple(alias_free(test, result.plant) for test in tests)
-    report = bound_residuals(result.plant, clean, plants, bound_order)
+    report = bound_residuals(result.plant, clean, plants, bound_order, below=bound_below, above=bound_above)
     record = fit_record(tests, result, report, checks)
     model = IdentifiedModel(result.plant, report.bound, standard_errors(result), record)
     return ModelFit(model, result, report, checks, clean)
@@ -86,6 +89,8 @@ def fit(
     integrators: int | None = None,
     soft: bool = False,
     bound_order: int = 2,
+    bound_below: float | None = None,
+    bound_above: float | None = None,
     seed: int = 0,
 ) -> IdentifiedModel:
     """Fit plant and bound to tests, with what is left open chosen by the Bayesian information criterion.
@@ -98,7 +103,7 @@ def fit(
         Zero and pole modes (up to 8 each), real zeros and poles (up to 1 each): one number for both, or a pair.
     integrators
         Poles at s = 0, 0 to 2.
-    soft, bound_order, seed
+    soft, bound_order, bound_below, bound_above, seed
         As for :func:`fit_model`.
 
     Raises
@@ -110,7 +115,16 @@ def fit(
         raise InputError(f"integrators is {shown(integrators)}; expected 0, 1 or 2")
     wanted = Wanted(integrators, _pair("modes", modes, MOST_MODES), _pair("real", real, 1))
     given = [tests] if isinstance(tests, FrequencyResponse) else tests
-    return fit_model(given, wanted, soft=soft, bound_order=bound_order, seed=seed).model
+    fitted = fit_model(
+        given,
+        wanted,
+        soft=soft,
+        bound_order=bound_order,
+        bound_below=bound_below,
+        bound_above=bound_above,
+        seed=seed,
+    )
+    return fitted.model
 
 
 def _pair(name: str, count: int | Sequence[int] | None, most: int) -> tuple[int, int] | None:

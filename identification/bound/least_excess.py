@@ -68,9 +68,10 @@ def least_largest_excess(omega: Real, residual: Real, envelope: Real, order: int
     roots may lie on the axis. Polynomials are in y = (x - x0)/(x + x0), which maps
     0 to infinity onto -1 to 1; N has the factor 1 - y, which makes it one degree smaller.
     """
-    centre = float(np.sqrt(omega[0]) * np.sqrt(omega[-1]))
+    half = float(np.sqrt(omega[-1] / omega[0]))  # of the band, from its centre; in ratios no unit is rounded
+    centre = omega[0] * half
     y = _mapped(omega / centre)
-    far = _mapped(np.concatenate([omega[0] / centre / FAR, omega[-1] / centre * FAR]))
+    far = _mapped(np.concatenate([1 / half / FAR, half * FAR]))
     seen = residual > FAINT * envelope
     largest = envelope.max()
     asked, allowed = (np.where(seen, residual, 0.0) / largest) ** 2, (envelope / largest) ** 2
