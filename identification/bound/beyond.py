@@ -15,7 +15,7 @@ from identification.model.plant import AdditiveBound
 from identification.model.reports import Outside
 
 FITTED = np.geomspace(1.0, OUTSIDE, 21)[1:]  # times the edges: where |W_a| is limited from the first round on
-SLOW = np.geomspace(OUTSIDE, 1e4, 21)[1:]  # and where it has to cover a level: below these no root is left to matter
+SLOW = np.geomspace(OUTSIDE, 300.0, 11)[1:]  # and where it has to cover a level: slower than these no root is left
 LOOKED = np.geomspace(1.0, 1e4, 801)
 FAR = 1e8
 

@@ -21,6 +21,7 @@ ROUNDS = 12
 BITS = 24  # of what is fitted
 TIGHT = 1e-3  # share by which W_a may miss a residual or exceed the largest excess in between
 ANGLES = 128  # equal ones on the circle that a mode draws in the complex plane, whose own peak they miss by 0.01 %
+PROGRAMS = 40  # linear ones for a start
 ITERATIONS = 100
 PRECISION = 1e-7  # in the logarithm of the excess
 
@@ -131,7 +132,7 @@ def fit_bound(points: Points, band: Band, order: int) -> AdditiveBound:
     """
     unit, size = band[1], float(points.least.max())
     omega, least, envelope = (_rounded(of) for of in (points.omega / unit, points.least / size, points.envelope / size))
-    ideal = least_largest_excess(omega, least, envelope, order)
+    ideal = least_largest_excess(omega, least, envelope, order, PROGRAMS)
     shape = Shape(order, float(_rounded(np.array([band[0] / unit]))[0]), 1.0)
     inside, weight = within(points.omega, band), np.zeros(omega.size)
     weight[inside] = shares(np.log(omega[inside]))

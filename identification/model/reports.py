@@ -82,9 +82,9 @@ class Outside:
             for level in (self.below, self.above)
         )
         return (
-            f"nothing was measured below {self.low:.4g} rad/s, where |W_a| {below} (at most {self.most_below:.4g}, at 0 "
-            f"{self.at_zero:.4g}), nor above {self.high:.4g} rad/s, where it {above} (at most {self.most_above:.4g}, "
-            f"far above {self.falling:.4g}/omega)"
+            f"nothing was measured below {self.low:.4g} rad/s, where |W_a| {below} (at most {self.most_below:.4g}, "
+            f"{self.at_zero:.4g} at 0), nor above {self.high:.4g} rad/s, where it {above} (at most "
+            f"{self.most_above:.4g}, {self.falling:.4g}/omega far above)"
         )
 
 
@@ -141,7 +141,7 @@ class BoundReport:
             "AdditiveBound": lambda members, key: bound,
             "Excess": excess,
             "Excess | None": or_none(excess),
-            "Outside | None": lambda of, key: record(Outside, member(of, key)) if key in of else None,
+            "Outside | None": lambda of, key: None if of.get(key) is None else record(Outside, member(of, key)),
             "tuple[Touch, ...]": lambda members, key: tuple(record(Touch, each) for each in objects(members, key)),
         }
         return record(cls, content, readers)
