@@ -129,6 +129,8 @@ def _words(name: str, value: object) -> list[str]:
         return [option] if value else []
     if isinstance(value, dict):
         return [option, ",".join(f"{theirs}={ours}" for theirs, ours in value.items())]
+    if name == "band":
+        return [option, *map(str, value)]  # type: ignore[call-overload]
     if isinstance(value, tuple):
         return [option, "/".join(map(str, value))]
     return [option, "auto" if value is None else str(value)]

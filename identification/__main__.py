@@ -11,6 +11,7 @@ if __name__ == "__main__":
     begin()
 
 from collections.abc import Callable
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -74,19 +75,36 @@ reading_options = together(
 """What a file of sweeps does not say itself; the values are those of ``Reading``."""
 
 
+def _band(
+    _ctx: click.Context, _param: click.Parameter, value: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    if value is not None and not 0 <= value[0] < value[1] < inf:
+        raise click.BadParameter(
+            f"{value[0]:g} {value[1]:g} is no band; expected two frequencies in Hz, 0 <= LOW < HIGH"
+        )
+    return value
+
+
 fit_options = together(
     click.option(
         "--modes", default="auto", type=Counts(8), metavar="auto|N|Z/P", help="Zero and pole modes.  [default: auto]"
     ),
     click.option(
-        "--real", default="auto", type=Counts(1), metavar="auto|N|Z/P", help="Real zeros and poles.  [default: auto]"
+        "--real", default="auto", type=Counts(3), metavar="auto|N|Z/P", help="Real zeros and poles.  [default: auto]"
     ),
     click.option(
         "--integrators",
         default="auto",
-        type=click.Choice(["auto", "0", "1", "2"]),
+        type=click.Choice(["auto", "-2", "-1", "0", "1", "2"]),
         show_default=True,
-        help="Poles at s = 0.",
+        help="Poles at s = 0; negative: zeros there.",
+    ),
+    click.option(
+        "--band",
+        type=(float, float),
+        callback=_band,
+        metavar="LOW HIGH",
+        help="In Hz, of every test; else noise at both ends of a band is left out.",
     ),
     click.option(
         "--loss",
@@ -135,6 +153,7 @@ def fit(
     modes: tuple[int, int] | None,
     real: tuple[int, int] | None,
     integrators: str,
+    band: tuple[float, float] | None,
     loss: str,
     bound_order: int,
     bound_below: float | None,
@@ -167,6 +186,7 @@ def fit(
             bound_below=bound_below,
             bound_above=bound_above,
             seed=seed,
+            band=band,
             tick=bar.update,
         )
     text = fitted.model.to_json()
@@ -175,7 +195,10 @@ def fit(
         writers[responses] = lambda path: write_responses(path, fitted.tests)
     write_whole(writers, inputs=files)
     bound = [bound_text(fitted.model.additive_bound), *bound_remarks(fitted.bound_fit)]
-    click.echo("\n".join([table(fitted.plant_fit), *bound, *check_lines(fitted.checks)]))
+    left_out = [f"{test.name}: {said}" for test in fitted.record.tests for said in test.left_out]
+    click.echo(
+        "\n".join([table(fitted.plant_fit, fitted.record.cautions), *left_out, *bound, *check_lines(fitted.checks)])
+    )
 
 
 if __name__ == "__main__":

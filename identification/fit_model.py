@@ -6,15 +6,21 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import index
 
+import numpy as np
+
 from identification.base.errors import InputError, shown
 from identification.bound.bound_residuals import bound_residuals
 from identification.fitting.fit_plant import FitResult, fit_plant
+from identification.fitting.other_classes import conjugated, fits_reversed, refuse_unstable
+from identification.fitting.single_test_fit import Misfit
 from identification.fitting.subspace_check import check_modes
+from identification.model.fit_record import FitRecord
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
 from identification.model.reports import BoundReport, SubspaceCheck
-from identification.model.structure import Wanted
+from identification.model.structure import INTEGRATORS, MOST_REAL, Wanted
 from identification.output.fit_facts import fit_record, standard_errors
+from identification.sweeps.noise_lines import within, without_noise
 from identification.sweeps.response import FrequencyResponse, alias_free
 
 MOST_MODES = 8
@@ -30,6 +36,8 @@ class ModelFit:
     ----------
     model
         Plant, bound, standard errors and the record of the fit.
+    record
+        How the model came about, its ``fit``.
     plant_fit, bound_fit
         How plant and bound were found.
     checks
@@ -39,6 +47,7 @@ class ModelFit:
     """
 
     model: IdentifiedModel
+    record: FitRecord
     plant_fit: FitResult
     bound_fit: BoundReport
     checks: Mapping[str, SubspaceCheck]
@@ -54,6 +63,7 @@ def fit_model(
     bound_below: float | None = None,
     bound_above: float | None = None,
     seed: int = 0,
+    band: tuple[float, float] | None = None,
     tick: Tick = lambda: None,
 ) -> ModelFit:
     """Fit the plant of Thesis Eq. (2.20) and the bound of (2.21) to tests.
@@ -65,20 +75,49 @@ def fit_model(
     bound_order, bound_below, bound_above
         Number of poles of W_a, and levels that it covers beyond the lines, see
         :func:`identification.bound.bound_residuals.bound_residuals`.
+    band
+        Lowest and highest frequency in Hz that is used of each test; None leaves out what is noise at both ends, see
+        :func:`identification.sweeps.noise_lines.without_noise`.
 
     Raises
     ------
     InputError
-        As these two do.
+        As these two do; no line lies in the band; or the plant is unstable.
+
+    Notes
+    -----
+    Where the conjugate of all responses fits far better than they do, their phase has the other sign, as that of
+    analysers that count a lag as positive, and the conjugate is fitted; ``record.conjugated`` says so.
     """
-    result = fit_plant(tests, wanted, soft=soft, seed=seed, tick=tick)
+    within_band = without_noise(tests) if band is None else [within(test, *band) for test in tests]
+    used, result, reversed_from = _fit_either_sign(within_band, wanted or Wanted(), soft=soft, seed=seed, tick=tick)
     plants = [test.plant for test in result.tests]
-    checks = _checks(tests, plants, tick)
-    clean = tuple(alias_free(test, result.plant) for test in tests)
+    checks = _checks(used, plants, tick)
+    clean = tuple(alias_free(test, result.plant) for test in used)
     report = bound_residuals(result.plant, clean, plants, bound_order, below=bound_below, above=bound_above)
-    record = fit_record(tests, result, report, checks)
+    record = fit_record(used, result, report, checks, reversed_from)
     model = IdentifiedModel(result.plant, report.bound, standard_errors(result), record)
-    return ModelFit(model, result, report, checks, clean)
+    return ModelFit(model, record, result, report, checks, clean)
+
+
+def _fit_either_sign(
+    tests: Sequence[FrequencyResponse], wanted: Wanted, *, soft: bool, seed: int, tick: Tick
+) -> tuple[Sequence[FrequencyResponse], FitResult, float | None]:
+    """The tests as they were fitted, the fit, and, if their phase is reversed, the misfit before; None if it is not."""
+    result, refusal, distance = None, None, np.inf
+    try:
+        result = fit_plant(tests, wanted, soft=soft, seed=seed, tick=tick)
+        distance = max(test.distance for test in result.tests)
+    except Misfit as error:
+        refusal = error
+    if fits_reversed(tests, wanted, distance, soft=soft):
+        turned = [conjugated(test) for test in tests]
+        return turned, fit_plant(turned, wanted, soft=soft, seed=seed, tick=tick), distance
+    refuse_unstable(tests[0], result, distance)
+    if refusal is not None:
+        raise refusal
+    assert result is not None
+    return tests, result, None
 
 
 def fit(
@@ -92,6 +131,7 @@ def fit(
     bound_below: float | None = None,
     bound_above: float | None = None,
     seed: int = 0,
+    band: tuple[float, float] | None = None,
 ) -> IdentifiedModel:
     """Fit plant and bound to tests, with what is left open chosen by the Bayesian information criterion.
 
@@ -100,10 +140,10 @@ def fit(
     tests
         One or more responses of the same plant.
     modes, real
-        Zero and pole modes (up to 8 each), real zeros and poles (up to 1 each): one number for both, or a pair.
+        Zero and pole modes (up to 8 each), real zeros and poles (up to 3 each): one number for both, or a pair.
     integrators
-        Poles at s = 0, 0 to 2.
-    soft, bound_order, bound_below, bound_above, seed
+        Poles at s = 0, up to 2; a negative number, down to -2, counts zeros there.
+    soft, bound_order, bound_below, bound_above, seed, band
         As for :func:`fit_model`.
 
     Raises
@@ -111,9 +151,9 @@ def fit(
     InputError
         A number is none of these, or see :func:`fit_model`.
     """
-    if integrators is not None and integrators not in (0, 1, 2):
-        raise InputError(f"integrators is {shown(integrators)}; expected 0, 1 or 2")
-    wanted = Wanted(integrators, _pair("modes", modes, MOST_MODES), _pair("real", real, 1))
+    if integrators is not None and integrators not in INTEGRATORS:
+        raise InputError(f"integrators is {shown(integrators)}; expected an integer from -2 to 2")
+    wanted = Wanted(integrators, _pair("modes", modes, MOST_MODES), _pair("real", real, MOST_REAL))
     given = [tests] if isinstance(tests, FrequencyResponse) else tests
     fitted = fit_model(
         given,
@@ -123,6 +163,7 @@ def fit(
         bound_below=bound_below,
         bound_above=bound_above,
         seed=seed,
+        band=band,
     )
     return fitted.model
 

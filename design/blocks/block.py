@@ -151,8 +151,8 @@ def mode_product(gain: float, modes: Iterable[Mode], rates: Iterable[float] = ()
 
 
 def plant_numerator(plant: PlantModel) -> Block:
-    """B(s) of Thesis Eq. (2.3), normalised as (2.20) is: B(0) = K."""
-    return mode_product(plant.gain, plant.zero_modes, plant.real_zeros)
+    """B(s) of Thesis Eq. (2.3), normalised as (2.20) is: B(s)/s^zeros at 0 -> K at s = 0."""
+    return Block(1.0, (0j,) * -plant.integrators) * mode_product(plant.gain, plant.zero_modes, plant.real_zeros)
 
 
 def plant_denominator(plant: PlantModel) -> Block:
@@ -173,12 +173,20 @@ def require_thesis_class(plant: PlantModel, excess: int = 0) -> None:
     Raises
     ------
     InputError
-        There is not exactly one integrator, or the plant has more zeros than poles or too many poles.
+        There is not exactly one integrator, a zero lies in the right half plane, or the plant has more zeros than poles
+        or too many poles.
     """
     if plant.integrators != 1:
+        found = f"{plant.integrators} integrators" if plant.integrators >= 0 else f"{-plant.integrators} zeros at s = 0"
         raise InputError(
-            f"the plant has {plant.integrators} integrators; the design expects exactly one, Eq. (2.20): Lemma 1, "
-            "(3.2) and (3.16) are for one"
+            f"the plant has {found}; the design expects exactly one integrator, Eq. (2.20): Lemma 1, (3.2) and (3.16) "
+            "are for one"
+        )
+    if plant.right_zeros:
+        zero = min(plant.right_zeros, key=abs)
+        raise InputError(
+            f"the plant has a zero in the right half plane, at {zero:.4g} rad/s; the design expects none, Eq. (2.20): "
+            "its controller has the plant's zeros as poles"
         )
     zeros, poles = (
         2 * len(modes) + len(rates)

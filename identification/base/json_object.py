@@ -123,6 +123,14 @@ def words(content: Mapping[str, Any], key: str) -> str:
     return value
 
 
+def texts(content: Mapping[str, Any], key: str) -> tuple[str, ...]:
+    """Return the list of texts at ``key``; raises InputError when there is none."""
+    values = content.get(key)
+    if not isinstance(values, list):
+        raise InputError(f"{shown(key)} is {shown(values)}; expected a list of texts")
+    return tuple(words({key: value}, key) for value in values)
+
+
 def truth(content: Mapping[str, Any], key: str) -> bool:
     """Return the truth value at ``key``; raises InputError when there is none."""
     value = content.get(key)

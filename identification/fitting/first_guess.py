@@ -8,35 +8,20 @@ import numpy as np
 from numpy.polynomial import Polynomial, chebyshev
 
 from identification.base.arrays import Complex, Real
+from identification.fitting.dead_time import likely_delays, turn_of
 from identification.model.structure import Structure
 
 ITERATIONS = 8
 UNTHREADED = 100_000  # multiplications of a matrix product; threads cost more than they bring at this size
-BOUNDS = (1e-5, 10.0)  # of a mode's damping ratio
-MOST_DELAYS = 100_000  # dead times that are told apart: lines very unevenly apart could tell more
+TURNS = 0.2  # cost a line that a dead time of a turn or more has to gain
+LEAST_ZETA = 1e-5  # of a mode
+APART = 1.05  # least zeta of a mode that is written as two real roots
 BAND = 10.0  # modes are sought up to this factor outside the band
 
 
-def group_delay(omega: Real, response: Complex) -> float:
-    """The dead time in seconds that the phase increments between neighbouring lines agree on best.
-
-    Notes
-    -----
-    The phase is not unwrapped: one wrong turn at a sharp zero would tilt all that follows. Each increment, wrapped
-    to (-pi, pi], votes for the delays h with increment + h * step near a multiple of 2 pi; the delay with
-    the most votes wins. On coarse lines the increments themselves are ambiguous; uneven steps are not.
-    """
-    step = np.diff(omega)
-    increment = np.angle(response[1:] * response[:-1].conj())
-    finest = 0.25 / np.max(step)
-    # A median increment over pi is an alias: so the usual step bounds the delays that can be told apart.
-    delays = np.arange(0.0, min(np.pi / np.quantile(step, 0.1), MOST_DELAYS * finest), finest)
-    votes = np.zeros(delays.size)
-    for block in np.array_split(np.arange(delays.size), 1 + delays.size * step.size // 500_000):
-        votes[block] = np.cos(increment + delays[block, None] * step).sum(axis=1)
-    best = delays[np.argmax(votes)]
-    left = np.angle(np.exp(1j * (increment + best * step)))
-    return max(0.0, float(best - np.median(left / step)))
+def most_zeta(omega: Real) -> float:
+    """The largest damping ratio that is sought at lines (M,): of two real roots at both ends of the search."""
+    return BAND * float(np.sqrt(omega.max() / omega.min())) / 2
 
 
 def guesses(omega: Real, response: Complex, sigma: Real, structure: Structure, keep: int) -> list[Real]:
@@ -51,23 +36,49 @@ def guesses(omega: Real, response: Complex, sigma: Real, structure: Structure, k
 
     Returns
     -------
-    list of (zeros + poles + 2,) arrays
+    list of (p,) arrays
         theta of :class:`identification.model.structure.Structure`, its gain left at 0.
 
     Notes
     -----
     Sanathanan-Koerner iterations for all delays of a grid at once: (j omega)^q e^{j omega h} H is fitted by N/D of the
     structure's degrees, D's leading coefficient 1, in Chebyshev polynomials of omega^2 (even and odd powers of
-    j omega apart). Roots in the right half plane are reflected.
+    j omega apart). Poles in the right half plane are reflected, and zeros are as far as the structure has fewer there.
     """
-    width = omega[-1] - omega[0]
-    far = 3 * (max(structure.zeros, structure.poles) // 2) + 3
-    delays = np.unique(np.maximum(0.0, group_delay(omega, response) + np.arange(-far, far + 1) / width))
+    delays, costs, best, _ = _rational_fits(omega, response, sigma, structure)
+    # dead times of a turn or more are tried only where shorter ones fail: noise must not choose among turns
+    order = np.argsort(costs + TURNS * omega.size * (delays >= turn_of(omega)))[:keep]
+    return [_guess(structure, best[k], delays[k], omega[-1], omega) for k in order]
+
+
+def unstable_poles(omega: Real, response: Complex, sigma: Real, structure: Structure) -> tuple[float, Complex]:
+    """How near a plant with poles on any side comes, as a median share of the response, and its poles on the right.
+
+    Parameters
+    ----------
+    omega, response, sigma, structure
+        As for :func:`guesses`.
+    """
+    _, costs, best, fitted = _rational_fits(omega, response, sigma, structure)
+    k = int(np.argmin(costs))
+    poles = _roots(np.append(best[k, structure.zeros + structure.right + 1 :], 1.0), omega[-1])
+    apart = np.abs(fitted[k] - 1)
+    return float(np.median(apart)), poles[poles.real > 0]
+
+
+def _rational_fits(
+    omega: Real, response: Complex, sigma: Real, structure: Structure
+) -> tuple[Real, Real, Real, Complex]:
+    """For K dead times: the costs (K,), the coefficients (K, p) and the model over the response (K, M)."""
+    width, zeros = omega[-1] - omega[0], structure.zeros + structure.right
+    far = 3 * (max(zeros, structure.poles) // 2) + 3
+    near = likely_delays(omega, response)[:, None] + np.arange(-far, far + 1) / width
+    delays = np.unique(np.maximum(0.0, near)) if structure.delayed else np.zeros(1)
     top = omega[-1]
-    powers = _powers(omega / top, max(structure.zeros, structure.poles))
-    numerator = powers[:, : structure.zeros + 1]
+    powers = _powers(omega / top, max(zeros, structure.poles))
+    numerator = powers[:, : zeros + 1]
     denominator = powers[:, : structure.poles]
-    integrators = (1j * omega) ** structure.integrators
+    integrators = (1j * omega) ** float(structure.integrators)
     target = integrators * response * np.exp(1j * delays[:, None] * omega)
     noise = np.abs(integrators) * sigma
     rows = np.concatenate(
@@ -81,6 +92,7 @@ def guesses(omega: Real, response: Complex, sigma: Real, structure: Structure, k
     previous = np.ones_like(target)
     costs = np.full(delays.size, np.inf)
     best = np.zeros((delays.size, rows.shape[1]))
+    model = np.zeros_like(target)
     for _ in range(ITERATIONS):
         weight = 1 / (noise * np.abs(previous))
         weighted = np.ascontiguousarray(rows * weight[:, None, :]).view(float)
@@ -89,14 +101,13 @@ def guesses(omega: Real, response: Complex, sigma: Real, structure: Structure, k
         gram = gram / (scale[:, :, None] * scale[:, None, :]) + 1e-14 * np.eye(gram.shape[1])
         moment = np.einsum("kim,km->ki", weighted, (leading * weight).view(float)) / scale
         solution = np.linalg.solve(gram, moment[..., None])[..., 0] / scale
-        previous = powers[:, structure.poles] + np.einsum("kp,mp->km", solution[:, structure.zeros + 1 :], denominator)
+        previous = powers[:, structure.poles] + np.einsum("kp,mp->km", solution[:, zeros + 1 :], denominator)
         previous = np.where(previous == 0, np.finfo(float).tiny, previous)
-        fitted = np.einsum("kp,mp->km", solution[:, : structure.zeros + 1], numerator) / previous
+        fitted = np.einsum("kp,mp->km", solution[:, : zeros + 1], numerator) / previous
         cost = np.sum(np.log1p(np.abs((target - fitted) / noise) ** 2), axis=1)
         better = cost < costs
-        costs[better], best[better] = cost[better], solution[better]
-    order = np.argsort(costs)[:keep]
-    return [_guess(structure, best[k], delays[k], top, omega) for k in order]
+        costs[better], best[better], model[better] = cost[better], solution[better], (fitted / target)[better]
+    return delays, costs, best, model
 
 
 def _powers(x: Real, degree: int) -> Complex:
@@ -130,25 +141,57 @@ def _in_powers_of_s(degree: int) -> Real:
 
 
 def _guess(structure: Structure, solution: Real, delay: float, top: float, omega: Real) -> Real:
-    zero_modes, real_zeros = _roots(solution[: structure.zeros + 1], top, omega)
-    pole_modes, real_poles = _roots(np.append(solution[structure.zeros + 1 :], 1.0), top, omega)
-    return np.concatenate([[0.0], zero_modes, pole_modes, real_zeros, real_poles, [delay]])
+    zeros = _roots(solution[: structure.zeros + structure.right + 1], top)
+    poles = _roots(np.append(solution[structure.zeros + structure.right + 1 :], 1.0), top)
+    left, right = _divided(zeros, structure.right)
+    sides = [
+        _modes_and_rates(roots, *counts, omega)
+        for roots, counts in zip((left, right, poles), structure.sides, strict=True)
+    ]
+    modes, rates = ([np.log(side[kind]).ravel() for side in sides] for kind in (0, 1))
+    return np.concatenate([[0.0], *modes, *rates, [delay]])
 
 
-def _roots(coefficients: Real, top: float, omega: Real) -> tuple[Real, Real]:
-    """Log omega, log zeta of each mode and log rate of the real root, if any, from coefficients of :func:`_powers`."""
+def _roots(coefficients: Real, top: float) -> Complex:
+    """The roots in units of omega from coefficients of :func:`_powers`; of pairs the one above the real axis."""
     degree = coefficients.size - 1
     if degree == 0:
-        return np.zeros(0), np.zeros(0)
+        return np.zeros(0, dtype=complex)
     polynomial = coefficients @ _in_powers_of_s(degree)
     # A vanishing leading coefficient means a root far above the band.
     smallest = 1e-12 * np.max(np.abs(polynomial))
     polynomial[-1] = polynomial[-1] if abs(polynomial[-1]) > smallest else smallest
-    roots = top * np.roots(polynomial[::-1])
+    roots = np.asarray(top * np.roots(polynomial[::-1]), dtype=complex)
+    return np.asarray(roots[roots.imag >= 0])
+
+
+def _divided(roots: Complex, degree: int) -> tuple[Complex, Complex]:
+    """The roots that stay left, and those of ``degree`` in all that are furthest to the right; pairs count twice."""
+    left, right = [], []
+    for root in sorted(roots, key=lambda root: -root.real / max(abs(root), 1e-300)):
+        size = 2 if root.imag > 0 else 1
+        if size <= degree:
+            right.append(root)
+            degree -= size
+        else:
+            left.append(root)
+    if degree:  # only pairs are left: one of them is taken for two real roots
+        pair = abs(left.pop(0))
+        left.append(pair)
+        right.append(pair)
+    return np.array(left, dtype=complex), np.array(right, dtype=complex)
+
+
+def _modes_and_rates(roots: Complex, modes: int, rates: int, omega: Real) -> tuple[Real, Real]:
+    """Omega and zeta (modes, 2) and rates (rates,) of roots, reflected into the left half plane and the search."""
     lowest, highest = omega[0] / BAND, omega[-1] * BAND
-    real = np.sort(np.clip(np.abs(roots[roots.imag == 0].real), lowest, highest))
-    alone, paired = real[: degree % 2], real[degree % 2 :]
-    found = [(abs(root), abs(root.real) / abs(root)) for root in roots if root.imag > 0]
+    found = sorted((abs(root), abs(root.real) / abs(root)) for root in roots if root.imag > 0)
+    real = sorted(np.clip(np.abs(roots[roots.imag == 0].real), lowest, highest).tolist())
+    while len(found) > modes:  # the most damped is written as two real roots
+        centre, zeta = found.pop(int(np.argmax([zeta for _, zeta in found])))
+        spread = np.arccosh(max(zeta, APART))
+        real = sorted([*real, *np.clip(centre * np.exp([-spread, spread]), lowest, highest)])
+    alone, paired = real[:rates], real[rates:]
     found += [(np.sqrt(a * b), (a + b) / (2 * np.sqrt(a * b))) for a, b in zip(paired[::2], paired[1::2], strict=True)]
-    modes = np.clip(np.array(sorted(found)).reshape(-1, 2), [lowest, 2 * BOUNDS[0]], [highest, BOUNDS[1] / 2])
-    return np.log(modes).ravel(), np.log(alone)
+    limits = [lowest, 2 * LEAST_ZETA], [highest, most_zeta(omega) / 2]
+    return np.clip(np.array(sorted(found)).reshape(-1, 2), *limits), np.array(alone)

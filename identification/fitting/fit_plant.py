@@ -9,14 +9,19 @@ import numpy as np
 
 from identification.base.errors import InputError
 from identification.fitting.grouped_lines import grouped
+from identification.fitting.likelihood import Likely
 from identification.fitting.nominal_plant import Nominal, nominal_of
 from identification.fitting.single_test_fit import OneFit, ScaledTest, Undetermined
-from identification.fitting.structure_selection import Selection
+from identification.fitting.structure_selection import ALIKE, Selection
 from identification.model.plant import PlantModel
 from identification.model.structure import Structure, Wanted
-from identification.sweeps.response import FrequencyResponse, require_one_band
+from identification.sweeps.response import FrequencyResponse, alias_free, require_one_band
 
+MOST_ALIKE = 3  # structures that are named beside the chosen one
+OPEN = 3.5  # half width of the interval of a gain, a logarithm, from which the data do not determine it
+FAR = 2.0  # times as far from the tests as the plant of least criterion
 CORRELATED = 0.3  # correlation of neighbouring residuals above which a fit may have missed something
+APART = 2.0  # standard errors of their distance by which two real roots are told from a mode of zeta near 1
 
 
 @dataclass(frozen=True)
@@ -29,8 +34,13 @@ class FitResult:
         The plant that stands for all tests.
     tests
         Each test's own fit.
+    distances
+        For each test the median of |test - nominal plant|/|test|.
     criterion
         Bayesian information criterion, summed over the tests, of each structure that was fitted to all.
+    alike
+        By how much the criterion of other structures differs from that of the chosen one, where it hardly tells them
+        apart, and where it is less: the chosen one has fewer roots outside the band.
     overdispersion
         By what the deviance is divided in the criterion; above 1 the residuals are no noise.
     soft
@@ -39,7 +49,9 @@ class FitResult:
 
     nominal: Nominal
     tests: tuple[OneFit, ...]
+    distances: tuple[float, ...]
     criterion: dict[Structure, float]
+    alike: dict[Structure, float]
     overdispersion: float
     soft: bool
 
@@ -119,15 +131,74 @@ def fit_plant(
     criterion = {structure: value for structure, value in criterion.items() if np.isfinite(value)}
     # exact data leave a richer structure nothing but rounding to explain
     simpler = [s for s in criterion if s.size < best.size]
+    undetermined, found = None, None
     for structure in [best, *sorted(simpler, key=criterion.__getitem__)]:
         try:
-            fits = [
-                test.finish(fit if test is few else test.taken_over(few, fit))
-                for test, few, fit in zip(whole, selection.tests, selection.fits[structure], strict=True)
-            ]
+            fits = _finished(whole, selection, structure)
         except Undetermined as error:
-            undetermined = error
+            undetermined = undetermined or error
             continue
         nominal = nominal_of(whole, fits)
-        return FitResult(nominal, tuple(fits), criterion, selection.overdispersion, soft)
-    raise undetermined
+        distances = tuple(median_distance(nominal.plant, test) for test in tests)
+        if found is not None and max(distances) > FAR * max(found.distances):
+            break  # a plant that is as good as any but for its gain is better than one that is not
+        result = FitResult(
+            nominal=nominal,
+            tests=tuple(fits),
+            distances=distances,
+            criterion=criterion,
+            alike={
+                other: value - criterion[structure]
+                for other, value in sorted(criterion.items(), key=lambda item: item[1])[: 1 + MOST_ALIKE]
+                if other != structure and value - criterion[structure] < ALIKE
+            },
+            overdispersion=selection.overdispersion,
+            soft=soft,
+        )
+        if nominal.half_widths[0] < OPEN:
+            return result
+        found = found or result
+    if found is None:
+        assert undetermined is not None
+        raise undetermined
+    return found
+
+
+def median_distance(plant: PlantModel, test: FrequencyResponse) -> float:
+    """The median over a test's lines of |test - plant|/|test|; lines of no response are left out."""
+    seen = test.response != 0
+    clean = alias_free(test, plant)
+    return float(np.median(np.abs(clean.response - plant(1j * test.omega))[seen] / np.abs(clean.response[seen])))
+
+
+def _finished(whole: Sequence[ScaledTest], selection: Selection, structure: Structure) -> list[OneFit]:
+    """Each test's last fit by a structure; two real roots that all tests tell apart are written as such."""
+    likely = [
+        fit if test is few else test.taken_over(few, fit)
+        for test, few, fit in zip(whole, selection.tests, selection.fits[structure], strict=True)
+    ]
+    fits = [test.finish(fit) for test, fit in zip(whole, likely, strict=True)]
+    rewritten = [_with_real_roots(test, fit) for test, fit in zip(whole, fits, strict=True)]
+    if selection.wanted.real is not None or len({fit.structure for fit in rewritten}) > 1:
+        return fits
+    try:
+        real = [test.finish(fit) for test, fit in zip(whole, rewritten, strict=True)]
+    except Undetermined:
+        return fits
+    return real if all(map(_are_apart, real)) else fits
+
+
+def _with_real_roots(test: ScaledTest, fit: OneFit) -> Likely:
+    structure, theta = fit.structure.with_real_roots(test.to_scaled(fit.structure, fit.theta))
+    return Likely(structure, theta, fit.sign, fit.floor / test.level, fit.relative, fit.deviance)
+
+
+def _are_apart(fit: OneFit) -> bool:
+    """Whether the real roots of each kind are further apart than their errors."""
+    for part in fit.structure.parts[3:]:
+        rates, covariance = fit.theta[part], fit.covariance[part, part]
+        variances = np.diag(covariance)
+        of_distance = variances[1:] + variances[:-1] - 2 * np.diag(covariance, 1)
+        if np.any(np.diff(rates) < APART * np.sqrt(of_distance)):
+            return False
+    return True

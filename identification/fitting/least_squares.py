@@ -14,23 +14,27 @@ BLOCK = 32768  # lines whose derivatives are held at a time
 
 def response_of(structure: Structure, theta: Real, omega: Real) -> Complex:
     """|K|/s^q prod(zeros)/prod(poles) exp(-delay s) at s = j omega, (M,)."""
-    return _derive(theta, structure.integrators, *structure.modes, *structure.real, omega, False)[0]
+    return _derive(theta, structure.counts, omega, False)[0]
 
 
 def log_jacobian(structure: Structure, theta: Real, omega: Real) -> Complex:
     """Derivative of the logarithm of :func:`response_of` with respect to theta, (M, p)."""
-    return _derive(theta, structure.integrators, *structure.modes, *structure.real, omega, True)[1]
+    return _derive(theta, structure.counts, omega, True)[1]
 
 
 @njit()
-def _derive(theta, integrators, zero_modes, pole_modes, real_zeros, real_poles, omega, derive):  # type: ignore[no-untyped-def]
+def _derive(theta, counts, omega, derive):  # type: ignore[no-untyped-def]
     """Response (M,) and, if asked for, the derivative of its logarithm (M, p)."""
+    integrators, left_modes, right_modes, pole_modes, left_rates, right_rates, real_poles = counts
+    zero_modes, real_zeros = left_modes + right_modes, left_rates + right_rates
     modes, rates = zero_modes + pole_modes, real_zeros + real_poles
     value = np.empty(omega.size, dtype=np.complex128)
     logs = np.empty((omega.size if derive else 0, theta.size), dtype=np.complex128)
     gain, delay = np.exp(theta[0]), theta[-1]
     natural, damping = np.exp(theta[1 : 1 + 2 * modes : 2]), 2 * np.exp(theta[2 : 2 + 2 * modes : 2])
+    damping[left_modes:zero_modes] *= -1
     rate = np.exp(theta[1 + 2 * modes : 1 + 2 * modes + rates])
+    rate[left_rates:real_zeros] *= -1
     for m in range(omega.size):
         w = omega[m]
         total = gain * (np.cos(delay * w) - 1j * np.sin(delay * w)) / (1j * w) ** integrators
@@ -85,20 +89,16 @@ def least_squares(
 
     ``tolerance`` is the relative change of the cost at which the search ends.
     """
-    counts = (structure.integrators, *structure.modes, *structure.real)
-    return np.asarray(_least_squares(theta, counts, omega, response, sigma, *bounds, soft, tolerance))
+    return np.asarray(_least_squares(theta, structure.counts, omega, response, sigma, *bounds, soft, tolerance))
 
 
 @njit()
 def _normal_at(theta, counts, omega, response, sigma, soft):  # type: ignore[no-untyped-def]
     """What :func:`_normal` gives at theta, BLOCK lines at a time."""
-    integrators, zero_modes, pole_modes, real_zeros, real_poles = counts
     cost, slope, curvature = 0.0, np.zeros(theta.size), np.zeros((theta.size, theta.size))
     for first in range(0, omega.size, BLOCK):
         last = first + BLOCK
-        value, logs = _derive(
-            theta, integrators, zero_modes, pole_modes, real_zeros, real_poles, omega[first:last], True
-        )
+        value, logs = _derive(theta, counts, omega[first:last], True)
         more = _normal(value, logs, response[first:last], sigma[first:last], soft)
         cost, slope, curvature = cost + more[0], slope + more[1], curvature + more[2]
     return cost, slope, curvature

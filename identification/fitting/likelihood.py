@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.base.arrays import Complex, Real
-from identification.fitting.first_guess import BAND, BOUNDS
+from identification.fitting.first_guess import BAND, LEAST_ZETA, most_zeta
 from identification.fitting.least_squares import least_squares, response_of
 from identification.model.pulse_response import aliases
 from identification.model.structure import Structure
@@ -212,10 +212,10 @@ def maximise_together(
 
 def _bounds(omega: Real, structure: Structure, theta: Real) -> tuple[Real, Real]:
     frequency = structure.frequencies()
-    lower = np.where(frequency, np.log(omega.min() / BAND), np.log(BOUNDS[0]))
-    upper = np.where(frequency, np.log(omega.max() * BAND), np.log(BOUNDS[1]))
+    lower = np.where(frequency, np.log(omega.min() / BAND), np.log(LEAST_ZETA))
+    upper = np.where(frequency, np.log(omega.max() * BAND), np.log(most_zeta(omega)))
     lower[0], upper[0] = theta[0] - GAIN, theta[0] + GAIN
-    lower[-1], upper[-1] = 0.0, np.inf
+    lower[-1], upper[-1] = 0.0, np.inf if structure.delayed else 0.0
     return lower, upper
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -10,41 +12,90 @@ from identification.base.arrays import Complex, Real
 from identification.fitting.first_guess import BAND
 from identification.fitting.least_squares import log_jacobian, response_of, stacked
 from identification.fitting.likelihood import Likely
-from identification.model.structure import Structure
+from identification.model.structure import INTEGRATORS, Structure
 
-Side = tuple[Real, Real]  # log omega and log zeta of modes (n, 2), log rates of real roots (0 or 1,)
+Side = tuple[Real, Real]  # log omega and log zeta of modes (n, 2), log rates of real roots (k,)
 
 GROWN_PLACES = 50
 GROWN_ZETAS = (0.02, 0.15)
 GROWN_APART = 0.5  # largest first distance between the new zero and pole, in logarithms
 OUTSIDE = 2.5  # factor from the band's edge beyond which a root may be one that the plant does not have
 DAMPED = np.log(0.3)  # a mode better damped than this may be a real root and one far away
+STEPS = (
+    *((0, -2, 0, -2), (0, -1, 0, -1), (0, -2, 0, 0), (0, 0, 0, -2), (0, -1, 0, 0), (0, 0, 0, -1)),
+    *((0, 0, -1, 0), (0, 0, -2, 0), (0, 0, -1, -1), (0, 0, -2, -2)),
+    *((-1, -1, 0, 0), (1, 0, 0, -1), (-1, 0, 0, 1), (1, 1, 0, 0), (-2, -2, 0, 0), (2, 0, 0, -2)),
+    *((0, 0, 0, 1), (0, 1, 0, 0), (0, 1, 0, 1)),
+)
+"""Integrators, left zeros, right zeros and poles that a step adds: fewer roots, s = 0 for a slow root, more roots."""
+FLIPS = ((0, -1, 1, 0), (0, -2, 2, 0), (0, 1, -1, 0), (0, 2, -2, 0))
+"""Steps that mirror zeros on the imaginary axis; their number of parameters stays the same."""
 
 
 def neighbours(structure: Structure) -> list[Structure]:
-    """The structures one step away: fewer roots, an integrator for a slow root or the reverse, more roots."""
-    steps = [
-        *((0, -2, -2), (0, -1, -1), (0, -2, 0), (0, 0, -2), (0, -1, 0), (0, 0, -1)),
-        *((-1, -1, 0), (1, 0, -1), (-1, 0, 1), (1, 1, 0)),
-        *((0, 0, 1), (0, 1, 0), (0, 1, 1)),
+    """The structures one step away: those of STEPS and FLIPS, and the one without or with a dead time."""
+    return [*stepped(structure, (*STEPS, *FLIPS)), replace(structure, delayed=not structure.delayed)]
+
+
+def stepped(structure: Structure, steps: Sequence[tuple[int, int, int, int]]) -> list[Structure]:
+    """The structures that steps such as those of STEPS lead to, as far as there are such."""
+    q, (left, right, poles) = structure.integrators, structure.degrees
+    near = [
+        replace(structure, integrators=q + dq, zeros=left + dl, right=right + dr, poles=poles + dp)
+        for dq, dl, dr, dp in steps
     ]
-    q, m, n = structure.integrators, structure.zeros, structure.poles
-    near = [Structure(q + dq, m + dm, n + dn) for dq, dm, dn in steps]
-    return [other for other in near if other.proper and 0 <= other.integrators <= 2]
+    return [other for other in near if other.proper and other.integrators in INTEGRATORS]
 
 
 def reached_from(fit: Likely, target: Structure, omega: Real) -> list[Real]:
     """First guesses (p,) of a neighbour of ``fit.structure``, in no order."""
-    zero_modes, pole_modes, real_zeros, real_poles = fit.structure.split(fit.theta)
-    zeros = _sides((zero_modes, real_zeros), target.zeros - fit.structure.zeros, omega)
-    poles = _sides((pole_modes, real_poles), target.poles - fit.structure.poles, omega)
+    delay = fit.theta[-1] if target.delayed else 0.0
+    sides = _sides_of(fit)
+    changes = [there - here for here, there in zip(fit.structure.degrees, target.degrees, strict=True)]
+    if changes[0] * changes[1] < 0:
+        source, goal = (0, 1) if changes[0] < 0 else (1, 0)
+        towards_right = 1 if source == 0 else -1
+        found = []
+        for one, other, lag in _mirrored(sides[source], sides[goal], changes[goal]):
+            zeros = (one, other) if source == 0 else (other, one)
+            found += [_joined(zeros[0], zeros[1], sides[2], h) for h in {delay, max(0.0, delay - towards_right * lag)}]
+        return found
     return [
-        np.concatenate([[0.0], z[0].ravel(), p[0].ravel(), z[1], p[1], fit.theta[-1:]])
-        for z, p in product(zeros, poles)
+        _joined(left, right, poles, delay)
+        for left, right, poles in product(*(_changed(*pair, omega) for pair in zip(sides, changes, strict=True)))
     ]
 
 
-def _sides(side: Side, change: int, omega: Real) -> list[Side]:
+def _sides_of(fit: Likely) -> tuple[Side, Side, Side]:
+    left_modes, right_modes, pole_modes, left_rates, right_rates, real_poles = fit.structure.split(fit.theta)
+    return (left_modes, left_rates), (right_modes, right_rates), (pole_modes, real_poles)
+
+
+def _joined(left: Side, right: Side, poles: Side, delay: float) -> Real:
+    """Theta (p,) with its gain left at 0."""
+    modes, rates = ([side[kind].ravel() for side in (left, right, poles)] for kind in (0, 1))
+    return np.concatenate([[0.0], *modes, *rates, [delay]])
+
+
+def _mirrored(source: Side, goal: Side, count: int) -> Iterator[tuple[Side, Side, float]]:
+    """Both sides after ``count`` roots, 1 or 2, went from one to the other, and the dead time that looks alike."""
+    modes, rates = source
+    if count == 2:
+        for i, (log_omega, log_zeta) in enumerate(modes):
+            lag = 4 * float(np.exp(log_zeta - log_omega))
+            yield (np.delete(modes, i, axis=0), rates), (np.vstack([goal[0], modes[i]]), goal[1]), lag
+        return
+    for i, rate in enumerate(rates):
+        yield (modes, np.delete(rates, i)), _with_root(*goal, rate), 2 * float(np.exp(-rate))
+    for i, (log_omega, log_zeta) in enumerate(modes):
+        if log_zeta > DAMPED:
+            spread = float(np.arccosh(max(1.0, np.exp(log_zeta))))
+            for shift in {-spread, spread}:
+                kept = _with_root(np.delete(modes, i, axis=0), rates, log_omega - shift)
+                yield kept, _with_root(*goal, log_omega + shift), 2 * float(np.exp(-log_omega - shift))
+
+
+def _changed(side: Side, change: int, omega: Real) -> list[Side]:
     """The polynomials with ``change`` roots more that are worth a try."""
     modes, rates = side
     if change == 0:
@@ -72,25 +123,27 @@ def _with_root(modes: Real, rates: Real, place: float) -> Side:
     return np.concatenate([modes, [mode]]), rates[:0]
 
 
-def within_band(fit: Likely, omega: Real) -> tuple[Structure, Real] | None:
-    """What is left of a fit without its roots far outside the band: slow poles are integrators, fast roots are nothing.
+def within_band(fit: Likely, omega: Real) -> tuple[Structure, Real, float] | None:
+    """What is left of a fit without its roots far outside the band: slow ones are at s = 0, fast ones are nothing.
 
-    None if no root is that far, or integrators would be fewer than 0 or more than 2.
+    None if no root is that far, or more poles or zeros would be at s = 0 than INTEGRATORS has. Else the structure, a
+    first guess (p,) and what such a root changes at a line, as a share of the response: at most about that.
     """
-    zero_modes, pole_modes, real_zeros, real_poles = fit.structure.split(fit.theta)
     low, high = np.log(omega[0] / OUTSIDE), np.log(omega[-1] * OUTSIDE)
-    zeros, slow_zeros = _kept((zero_modes, real_zeros), low, high)
-    poles, slow_poles = _kept((pole_modes, real_poles), low, high)
-    counts = [2 * len(modes) + len(rates) for modes, rates in (zeros, poles)]
-    left = Structure(fit.structure.integrators + slow_poles - slow_zeros, *counts)
-    if left == fit.structure or not (left.proper and 0 <= left.integrators <= 2):
+    kept, slow, nearest = zip(*(_kept(side, low, high) for side in _sides_of(fit)), strict=True)
+    left, right, poles = (2 * len(modes) + len(rates) for modes, rates in kept)
+    integrators = fit.structure.integrators + slow[2] - slow[0] - slow[1]
+    there = replace(fit.structure, integrators=integrators, zeros=left, right=right, poles=poles, real_pairs=(0, 0, 0))
+    if there == fit.structure or not (there.proper and integrators in INTEGRATORS):
         return None
-    return left, np.concatenate([[0.0], zeros[0].ravel(), poles[0].ravel(), zeros[1], poles[1], fit.theta[-1:]])
+    left_zeros, right_zeros, left_poles = kept
+    change = float(np.exp(-min(nearest))) / OUTSIDE
+    return there, _joined(left_zeros, right_zeros, left_poles, fit.theta[-1]), change
 
 
-def _kept(side: Side, low: float, high: float) -> tuple[Side, int]:
-    """The roots between ``low`` and ``high``, logarithms, and how many lie below."""
-    modes, rates, slow = np.zeros((0, 2)), np.zeros(0), 0
+def _kept(side: Side, low: float, high: float) -> tuple[Side, int, float]:
+    """The roots between ``low`` and ``high``, logarithms; how many lie below; how far the nearest outside lies."""
+    modes, rates, slow, apart = np.zeros((0, 2)), np.zeros(0), 0, [np.inf]
     real = list(side[1])
     for log_omega, log_zeta in side[0]:
         if log_zeta > 0:
@@ -100,12 +153,14 @@ def _kept(side: Side, low: float, high: float) -> tuple[Side, int]:
             modes = np.vstack([modes, [log_omega, log_zeta]])
         else:
             slow += 2 * (log_omega <= low)
+            apart.append(max(low - log_omega, log_omega - high))
     for place in real:
         if low < place < high:
             modes, rates = _with_root(modes, rates, place)
         else:
             slow += place <= low
-    return (modes, rates), int(slow)
+            apart.append(max(low - place, place - high))
+    return (modes, rates), int(slow), float(min(apart))
 
 
 def has_needle(fit: Likely, omega: Real) -> bool:
@@ -113,12 +168,21 @@ def has_needle(fit: Likely, omega: Real) -> bool:
 
     They change one line or two, which noise that is not Gaussian can ask for and a plant hardly.
     """
-    zeros, poles, _, _ = (np.exp(logs) for logs in fit.structure.split(fit.theta))
+    left, right, poles = (np.exp(modes) for modes, _ in _sides_of(fit))
+    zeros = np.concatenate([left, right])
     middle = (zeros[:, None, 0] + poles[None, :, 0]) / 2
     i = np.clip(np.searchsorted(omega, middle), 1, omega.size - 1)
     spacing = omega[i] - omega[i - 1]
     widths = np.maximum(zeros.prod(axis=1)[:, None], poles.prod(axis=1)[None, :])
     return bool(np.any((np.abs(zeros[:, None, 0] - poles[None, :, 0]) < spacing) & (widths < spacing)))
+
+
+def cancels_origin(fit: Likely, omega: Real) -> bool:
+    """Whether a zero below the lowest line hides a pole at s = 0 from all lines, or a pole there a zero at s = 0."""
+    left, right, poles = _sides_of(fit)
+    q = fit.structure.integrators
+    against = [left, right] if q > 0 else [poles] if q < 0 else []
+    return any(_kept(side, np.log(omega[0]), np.inf)[1] for side in against)
 
 
 def grown(fit: Likely, omega: Real, response: Complex, sigma: Real, count: int) -> list[Real]:
@@ -142,13 +206,11 @@ def grown(fit: Likely, omega: Real, response: Complex, sigma: Real, count: int) 
     gram += 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(2)
     seen = np.einsum("cim,m->ci", rows, residual.view(float)) - inside @ (residual.view(float) @ basis)
     apart = np.linalg.solve(gram, seen[..., None])[..., 0]
-    zero_modes, pole_modes, real_zeros, real_poles = fit.structure.split(fit.theta)
+    left, right, poles = _sides_of(fit)
     starts = []
     for i in np.argsort(np.sum(seen * apart, axis=1))[::-1][:count]:
         mode = np.log([places.flat[i], zetas.flat[i]])
         half = np.clip(apart[i], -GROWN_APART, GROWN_APART) / 2
-        zeros, poles = np.vstack([zero_modes, mode + half]), np.vstack([pole_modes, mode - half])
-        starts.append(
-            np.concatenate([fit.theta[:1], zeros.ravel(), poles.ravel(), real_zeros, real_poles, fit.theta[-1:]])
-        )
+        zeros, more = np.vstack([left[0], mode + half]), np.vstack([poles[0], mode - half])
+        starts.append(_joined((zeros, left[1]), right, (more, poles[1]), fit.theta[-1]))
     return starts

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc, ndtri, stdtrit
+from scipy.special import chdtrc, stdtrit
 
 from identification.base.arrays import Real
 from identification.base.errors import InputError
@@ -15,9 +15,9 @@ from identification.fitting.single_test_fit import FINE, OneFit, ScaledTest
 from identification.model.plant import PlantModel
 from identification.model.structure import Structure
 
-INSIGNIFICANT = 2.0  # a delay below this many standard errors of the noise is taken as none: it is bounded by 0
 CONFIDENCE = 0.95
 ONE_PLANT = 0.01  # probability below which tests of one plant do not differ as much as these do
+NOISE = 2  # parameters of a test's noise
 WIDEST = 20.0  # half width, a logarithm, beyond which an interval says nothing
 
 
@@ -41,6 +41,8 @@ class Nominal:
         Probability that tests of one plant differ as much as these do (None for one test).
     count
         Number of tests.
+    freedom
+        Of the residuals of all tests, real numbers less parameters.
     """
 
     structure: Structure
@@ -51,14 +53,12 @@ class Nominal:
     scatter: Real | None
     agreement: float | None
     count: int
+    freedom: int
 
     @property
     def plant(self) -> PlantModel:
-        """The nominal plant; a delay that cannot be told from none is none."""
-        theta = self.theta.copy()
-        if theta[-1] < INSIGNIFICANT * self.noise[-1]:
-            theta[-1] = 0.0
-        return self.structure.plant(theta, self.sign)
+        """The nominal plant."""
+        return self.structure.plant(self.theta, self.sign)
 
     @property
     def scattered(self) -> bool:
@@ -73,29 +73,24 @@ class Nominal:
 
     @property
     def half_widths(self) -> Real:
-        """(p,) of the 95 % intervals of theta; of the scatter by Student's distribution."""
-        normal = ndtri((1 + CONFIDENCE) / 2)
-        random = normal * self.noise
+        """(p,) of the 95 % intervals of theta, by Student's distribution: noise and scatter are estimated."""
+        usual = stdtrit(self.freedom, (1 + CONFIDENCE) / 2)
+        random = usual * self.noise
         if self.scatter is not None and self.scattered:
             student = stdtrit(self.count - 1, (1 + CONFIDENCE) / 2)
             random = np.maximum(random, student * self.scatter)
-        return np.minimum(np.hypot(random, normal * self.misfit), WIDEST)
+        return np.minimum(np.hypot(random, usual * self.misfit), WIDEST)
 
     @property
     def intervals(self) -> tuple[Real, Real]:
-        """Lower and upper ends (p,) of the 95 % intervals in physical units; positive but for the gain's sign."""
+        """Lower and upper ends (p,) of the 95 % intervals in physical units."""
         ends = [self._physical(self.theta + side * self.half_widths) for side in (-1, 1)]
-        return (ends[0], ends[1]) if self.sign > 0 else (self._swapped(ends[0], ends[1]))
+        return np.minimum(*ends), np.maximum(*ends)
 
     def _physical(self, theta: Real) -> Real:
-        values = np.append(np.exp(theta[:-1]), max(0.0, theta[-1]))
+        values = np.append(np.exp(theta[:-1]), max(0.0, theta[-1])) * self.structure.signs()
         values[0] *= self.sign
         return values
-
-    @staticmethod
-    def _swapped(lower: Real, upper: Real) -> tuple[Real, Real]:
-        lower[0], upper[0] = upper[0], lower[0]
-        return lower, upper
 
 
 def nominal_of(tests: Sequence[ScaledTest], fits: Sequence[OneFit]) -> Nominal:
@@ -130,17 +125,17 @@ def nominal_of(tests: Sequence[ScaledTest], fits: Sequence[OneFit]) -> Nominal:
             f"{', '.join(fit.name for fit in fits if fit.sign < 0)}; expected tests of one plant"
         )
     thetas, count = np.array([fit.theta for fit in fits]), len(fits)
-    theta, agreement, scatter = thetas.mean(axis=0), None, None
+    structure, theta, agreement, scatter = fits[0].structure, thetas.mean(axis=0), None, None
     covariances = np.array([fit.covariance for fit in fits])
     variances = np.einsum("tii->ti", covariances)
     noise = variances.mean(axis=0) / count
     if count > 1:
         scatter = thetas.std(axis=0, ddof=1) / np.sqrt(count)
         one, increase = _together(tests, fits)
-        together = chdtrc(theta.size * (count - 1), increase)
+        together = chdtrc(structure.free * (count - 1), increase)
         mean = np.average(thetas, axis=0, weights=1 / variances)
         alone = chdtrc(count - 1, np.sum((thetas - mean) ** 2 / variances, axis=0))
-        agreement = float(min(1.0, 2 * together, 2 * theta.size * alone.min()))
+        agreement = float(min(1.0, 2 * together, 2 * structure.free * alone.min()))
         if agreement >= ONE_PLANT:
             theta = one
             pairs = zip(tests, fits, strict=True)
@@ -150,8 +145,22 @@ def nominal_of(tests: Sequence[ScaledTest], fits: Sequence[OneFit]) -> Nominal:
             units = np.sqrt(variances.mean(axis=0))
             information = np.linalg.inv(covariances / np.outer(units, units)).sum(axis=0)
             noise = np.diag(np.linalg.inv(information)) * units**2
+            # weights that are estimated make a mean less sure than known ones (Meier, Biometrics 9, 1953)
+            shares = 1 / variances / np.sum(1 / variances, axis=0)
+            freedoms = np.array([[fit.lines * 2 - structure.free - NOISE] for fit in fits])
+            noise *= 1 + np.sum(4 / np.maximum(freedoms, 1) * shares * (1 - shares), axis=0)
     misfit = np.mean([fit.misfit * variance for fit, variance in zip(fits, variances, strict=True)], axis=0)
-    return Nominal(fits[0].structure, theta, signs.pop(), np.sqrt(noise), np.sqrt(misfit), scatter, agreement, count)
+    return Nominal(
+        structure=structure,
+        theta=theta,
+        sign=signs.pop(),
+        noise=np.sqrt(noise),
+        misfit=np.sqrt(misfit),
+        scatter=scatter,
+        agreement=agreement,
+        count=count,
+        freedom=max(1, sum(2 * fit.lines - structure.free - NOISE for fit in fits)),
+    )
 
 
 def _together(tests: Sequence[ScaledTest], fits: Sequence[OneFit]) -> tuple[Real, float]:

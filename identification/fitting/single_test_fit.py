@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
+from identification.fitting.dead_time import same_turn
 from identification.fitting.first_guess import guesses
 from identification.fitting.least_squares import information, response_of
 from identification.fitting.likelihood import Likely, Lines, maximise
@@ -32,6 +33,10 @@ SINGULAR = 1e-13  # smallest eigenvalue of the scaled information matrix that ca
 
 class Undetermined(InputError):
     """The data do not determine the parameters of a model."""
+
+
+class Misfit(InputError):
+    """A model is nowhere near the data."""
 
 
 @dataclass(frozen=True)
@@ -193,6 +198,11 @@ class ScaledTest:
         power = float(np.sum(np.abs(r) ** 2))
         return float(np.vdot(r[1:], r[:-1]).real / power) if power > 0 else 0.0
 
+    def distance(self, likely: Likely) -> float:
+        """The median of |test - plant|/|test| over the lines; those of no response are left out."""
+        size = np.abs(self._response(likely))
+        return float(np.median(np.abs(self._residual(likely))[size > 0] / size[size > 0]))
+
     def exact(self, likely: Likely) -> bool:
         """Whether nothing but rounding is left."""
         return max(likely.floor, likely.relative) < ROUNDING
@@ -202,7 +212,7 @@ class ScaledTest:
 
         Raises
         ------
-        InputError
+        Misfit
             The model is nowhere near the data.
         Undetermined
             The data leave a parameter undetermined.
@@ -214,16 +224,20 @@ class ScaledTest:
         """
         likely = self._maximise(likely.structure, likely.theta, self._sigma(likely), FINE)
         structure = likely.structure
+        turn = same_turn(self.omega)
+        if turn is not None and likely.theta[-1] >= turn:  # of dead times that look alike, the shortest
+            start = np.append(likely.theta[:-1], likely.theta[-1] % turn)
+            likely = self._maximise(structure, start, self._sigma(likely), FINE)
         likely = replace(likely, theta=likely.theta[structure.in_order(likely.theta)])
-        distance = float(np.median(np.abs(self._residual(likely)) / np.maximum(np.abs(self._response(likely)), 1e-300)))
+        distance = self.distance(likely)
         if distance > WORST:
-            raise InputError(
-                f"{self.name}: no stable minimum phase plant with {structure} fits (median distance "
+            raise Misfit(
+                f"{self.name}: no stable plant with {structure} fits (median distance "
                 f"{100 * distance:.0f} % of the response); expected at most {100 * WORST:.0f} %"
             )
         correlation = self.correlation(likely)
         z = np.abs(self._residual(likely) / self._sigma(likely)) ** 2
-        freedom = 1 - structure.size / (2 * self.omega.size)
+        freedom = 1 - (structure.free + 1) / (2 * self.omega.size)  # the ratio of the noise's two levels counts too
         spread = float(np.mean(z)) / 2 / freedom
         if self.soft:
             spread = float(np.mean(z / (1 + z)) / 2 / np.mean((1 + z / 2) / (1 + z) ** 1.5) ** 2) / freedom

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from identification.base.errors import InputError
+from identification.fitting.first_guess import BAND
 from identification.fitting.likelihood import Likely
-from identification.fitting.neighbouring_structures import has_needle, neighbours, reached_from, within_band
+from identification.fitting.neighbouring_structures import (
+    FLIPS,
+    cancels_origin,
+    has_needle,
+    neighbours,
+    reached_from,
+    stepped,
+    within_band,
+)
 from identification.fitting.single_test_fit import ScaledTest
-from identification.model.structure import Structure, Wanted
+from identification.model.structure import INTEGRATORS, Structure, Wanted
 
 MOST_MODES = 8
 BEHIND = 1.0  # deviance a line, behind the best number of integrators, at which another one is given up
@@ -18,6 +28,9 @@ WHITE = 0.1  # correlation of neighbouring residuals below which nothing is left
 FRUITLESS = 2  # rows of the path without a better structure after which it ends
 LEVELLED = 0.2  # of the path's largest gain, below which gains are taken for those of superfluous pairs
 SUPERFLUOUS = 8.0  # deviance that a mode pair too many takes off a test's white residuals; 4 to 10 seen
+ALIKE = 6.0  # criteria closer than this are no strong evidence (Raftery, Sociol. Methodol. 25, 1995)
+MATERIAL = 4.0  # times the median distance, that a root outside the band changes the response near its edge
+AT_EDGE = 1.02  # times the end of the search
 HOPELESS = 20.0  # criterion lost on the first tests after which the others are not asked
 
 
@@ -85,16 +98,23 @@ class Selection:
         return max(1.0, float(np.median(small)) / SUPERFLUOUS) if small.size > 1 else 1.0
 
     def _climb(self, best: Structure) -> Structure:
-        """Single steps from ``best`` as long as the criterion falls."""
+        """Single steps from ``best`` as long as the criterion falls.
+
+        Where it hardly tells on which side of the axis zeros lie, they lie on the left.
+        """
         tried = {best}
         while True:
-            better = best
+            better, is_white = best, self.white(best)
             for step in neighbours(best):
                 if step in tried or not self._affordable(step) or not self.wanted.admits(step):
                     continue
+                if is_white and step.right > best.right:
+                    continue  # noise cannot ask for a zero in the right half plane
                 tried.add(step)
-                if self._step(best, step) and self.criterion(step) < self.criterion(better):
+                if self._step(best, step) and self._preference(step) < self._preference(better):
                     better = step
+            if better == best:
+                better = self._shed(best, tried)
             if better == best:
                 return best
             best = better
@@ -105,6 +125,9 @@ class Selection:
             return np.inf
         return sum(map(self._criterion_of, range(len(self.tests)), self.fits[structure]))
 
+    def _preference(self, structure: Structure) -> float:
+        return self.criterion(structure) + ALIKE * structure.right
+
     def white(self, structure: Structure) -> bool:
         """Whether a structure leaves nothing to explain in any test."""
         pairs = zip(self.tests, self.fits[structure], strict=True)
@@ -114,12 +137,18 @@ class Selection:
         """Structures that grow by one zero mode and one pole mode at a time; those admitted are never none."""
         zero_modes, pole_modes = self.wanted.modes or (MOST_MODES, MOST_MODES)
         real_zeros, real_poles = self.wanted.real or (0, 0)
-        integrators = [q for q in range(3) if self.wanted.integrators in (None, q)]
+        pairs = (real_zeros // 2, 0, real_poles // 2)
+        integrators = [q for q in INTEGRATORS if self.wanted.integrators in (None, q)]
+        right = 0
         path: list[Structure] = []
         fruitless, last = 0, None
         for n in range(max(zero_modes, pole_modes) + 1):
             zeros, poles = 2 * min(n, zero_modes) + real_zeros, 2 * min(n, pole_modes) + real_poles
-            row = [Structure(q, zeros, poles) for q in integrators]
+            open_zeros = 0 if self.wanted.modes else 2  # a zero at s = 0 takes the place of another
+            row = [
+                Structure(q, zeros - right - min(max(-q, 0), open_zeros), poles, right, real_pairs=pairs)
+                for q in integrators
+            ]
             row = [structure for structure in row if structure.proper and self._affordable(structure)]
             if not row:
                 continue
@@ -129,7 +158,8 @@ class Selection:
                 leader = min(leader or structure, structure, key=self._deviance)
             assert leader is not None
             path.append(leader)
-            self._shed(leader)
+            self._shed(leader, set())
+            right = self._mirrored(leader).right
             if len(path) > 1:
                 limit = self._deviance(leader) + BEHIND * sum(test.omega.size for test in self.tests)
                 row = [structure for structure in row if self._deviance(structure) < limit]
@@ -149,7 +179,7 @@ class Selection:
 
         The search for guesses ends early where they stay far behind a rival structure.
         """
-        below = self.fits.get(Structure(structure.integrators, structure.zeros - 2, structure.poles - 2))
+        below = self.fits.get(replace(structure, zeros=structure.zeros - 2, poles=structure.poles - 2))
         to_beat = [fit.deviance for fit in self.fits[rival]] if rival else [np.inf] * len(self.tests)
         fits: list[Likely] = []
         for i, test in enumerate(self.tests):
@@ -166,23 +196,48 @@ class Selection:
                 fits[i] = min(fits[i], test.follow(self.tests[leader], fits[leader]), key=lambda fit: fit.deviance)
         self.fits[structure] = fits
 
-    def _shed(self, here: Structure) -> None:
-        """Fit what is left of a structure without the roots that the first test puts far outside the band."""
+    def _shed(self, here: Structure, tried: set[Structure]) -> Structure:
+        """What is left of a structure without the roots that the first test puts far outside the band.
+
+        That is fitted, and returned if the criterion does not speak strongly against it, or if those roots are where
+        the search ends and change less than MATERIAL times what the model leaves at a line. It counts as ``tried``.
+        """
         first = self.tests[0]
         left = within_band(self.fits[here][0], first.omega)
-        if left is None or left[0] in self.fits or not self.wanted.admits(left[0]):
-            return
-        fit = first.pursue(left[0], [left[1]], self.fits[here][0], np.inf)
-        self.fits[left[0]] = [fit, *(test.follow(first, fit) for test in self.tests[1:])]
+        if left is None or not self.wanted.admits(left[0]):
+            return here
+        there = left[0]
+        tried.add(there)
+        if there not in self.fits:
+            fit = first.pursue(there, [left[1]], self.fits[here][0], np.inf)
+            self.fits[there] = [fit, *(test.follow(first, fit) for test in self.tests[1:])]
+            self.tick()
+        worse = self.criterion(there) - self.criterion(here)
+        most = min(AT_EDGE / BAND, MATERIAL * first.distance(self.fits[here][0]))
+        immaterial = not self.white(here) and left[2] < most
+        return there if worse < ALIKE or (immaterial and worse < np.inf) else here
+
+    def _mirrored(self, here: Structure) -> Structure:
+        """The likeliest of a structure and of those in which one of its zeros is mirrored on the imaginary axis."""
+        if self.white(here):
+            return here
+        better = here
+        for there in stepped(here, FLIPS):
+            if there not in self.fits and self._affordable(there) and self._step(here, there):
+                better = min(better, there, key=self._deviance)
+        return better if self._deviance(better) < self._deviance(here) - ALIKE * len(self.tests) else here
 
     def _step(self, here: Structure, there: Structure) -> bool:
         """Fit a neighbour from the parameters of ``here``; False when the first tests say that it is worse."""
         fits: list[Likely] = []
         lost = 0.0
         for i, (test, known) in enumerate(zip(self.tests, self.fits[here], strict=True)):
-            penalty = (there.size - here.size) * self._penalty(i)
+            penalty = self._penalty(i, there) - self._penalty(i, here)
             to_beat = known.deviance - self.overdispersion * (penalty - HOPELESS)
-            found = test.pursue(there, reached_from(known, there, test.omega), known, to_beat)
+            starts = reached_from(known, there, test.omega)
+            if not starts:
+                return False
+            found = test.pursue(there, starts, known, to_beat)
             fits.append(found)
             lost += self._criterion_of(i, found) - self._criterion_of(i, known)
             self.tick()
@@ -192,21 +247,26 @@ class Selection:
         return True
 
     def _criterion_of(self, i: int, fit: Likely) -> float:
-        """The criterion of one test; the noise has two parameters. Infinite where a mode pair explains one line."""
-        if has_needle(fit, self.tests[i].omega):
+        """The criterion of one test; infinite where a mode pair explains one line or no line shows what is at s = 0."""
+        omega = self.tests[i].omega
+        if has_needle(fit, omega) or (self.wanted.integrators is None and cancels_origin(fit, omega)):
             return np.inf
-        return fit.deviance / self.overdispersion + (fit.structure.size + 2) * self._penalty(i)
+        return fit.deviance / self.overdispersion + self._penalty(i, fit.structure)
 
     def _deviance(self, structure: Structure) -> float:
         return sum(fit.deviance for fit in self.fits[structure])
 
-    def _penalty(self, i: int) -> float:
-        """Of one parameter: the logarithm of how many numbers a test is, two a line."""
-        return float(np.log(2 * self.tests[i].omega.size))
+    def _penalty(self, i: int, structure: Structure) -> float:
+        """k log n, n numbers being two a line, for few lines more (McQuarrie, Stat. Probab. Lett. 44, 1999).
+
+        The noise has two of the k parameters.
+        """
+        n, k = 2 * self.tests[i].omega.size, structure.free + 2
+        return float(k * np.log(n) * n / (n - k - 2))
 
     def _affordable(self, structure: Structure) -> bool:
         """Whether every test has twice as many numbers as there are parameters."""
-        return all(test.omega.size >= structure.size + 2 for test in self.tests)
+        return all(test.omega.size >= structure.free + 2 for test in self.tests)
 
     def _refuse(self) -> None:
         shortest = min(self.tests, key=lambda test: test.omega.size)

@@ -10,9 +10,11 @@ from identification.base.json_object import (
     Reader,
     member,
     number,
+    numbers,
     objects,
     or_none,
     record,
+    texts,
     truth,
     words,
 )
@@ -81,6 +83,10 @@ class FittedTest:
         From its own fit, as a share of the response.
     synthetic
         Whether it was never measured.
+    band
+        Its lowest and highest line, in rad/s.
+    left_out
+        Lines that were not used, in sentences.
     """
 
     name: str
@@ -93,6 +99,8 @@ class FittedTest:
     median_distance: float
     sha256: str | None
     synthetic: bool
+    band: tuple[float, float]
+    left_out: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """An entry of ``tests``."""
@@ -100,6 +108,8 @@ class FittedTest:
             "plant": plant_to_dict(self.plant),
             "standard_errors": shaped(self.plant, self.standard_errors),
             "noise": asdict(self.noise),
+            "band": list(self.band),
+            "left_out": list(self.left_out),
         }
 
     @classmethod
@@ -110,6 +120,8 @@ class FittedTest:
             "PlantModel": lambda members, key: plant,
             "Numbers": lambda members, key: from_shape(plant, member(members, key)),
             "Noise": lambda members, key: record(Noise, member(members, key)),
+            "tuple[float, float]": numbers,
+            "tuple[str, ...]": texts,
         }
         return record(cls, content, readers)
 
@@ -122,6 +134,8 @@ class FitRecord:
     ----------
     source, method, loss
         In words.
+    conjugated
+        Whether the sign of the tests' phase was reversed.
     synthetic
         Whether any of the tests was never measured.
     structure
@@ -135,6 +149,10 @@ class FitRecord:
         which a single one has not.
     agreement_of_tests
         With which probability tests of one plant would differ as much; None for a single one.
+    median_distances
+        Of each test from the nominal plant, as a share of the response.
+    cautions
+        What the data leave open, in sentences.
     tests
         Each with its own fit.
     bound
@@ -148,6 +166,7 @@ class FitRecord:
     structure: str
     method: str
     loss: str
+    conjugated: bool
     criterion: Criterion
     lower: Numbers
     upper: Numbers
@@ -155,6 +174,8 @@ class FitRecord:
     misfit: Numbers
     scatter: Numbers | None
     agreement_of_tests: float | None
+    median_distances: tuple[float, ...]
+    cautions: tuple[str, ...]
     tests: tuple[FittedTest, ...]
     bound: BoundReport
     checks: Mapping[str, SubspaceCheck]
@@ -167,12 +188,15 @@ class FitRecord:
             "structure": self.structure,
             "method": self.method,
             "loss": self.loss,
+            "conjugated": self.conjugated,
             "criterion": asdict(self.criterion),
             "intervals_95": {"lower": shaped(plant, self.lower), "upper": shaped(plant, self.upper)},
             "noise_standard_errors": shaped(plant, self.noise),
             "misfit_standard_errors": shaped(plant, self.misfit),
             "scatter_standard_errors": None if self.scatter is None else shaped(plant, self.scatter),
             "agreement_of_tests": self.agreement_of_tests,
+            "median_distances": list(self.median_distances),
+            "cautions": list(self.cautions),
             "tests": [test.to_dict() for test in self.tests],
             "bound": self.bound.to_dict(),
             "subspace_check": [
@@ -200,6 +224,7 @@ class FitRecord:
             structure=words(content, "structure"),
             method=words(content, "method"),
             loss=words(content, "loss"),
+            conjugated=truth(content, "conjugated"),
             criterion=record(Criterion, member(content, "criterion"), {"Mapping[str, float]": _by_name}),
             lower=values(ends, "lower"),
             upper=values(ends, "upper"),
@@ -207,6 +232,8 @@ class FitRecord:
             misfit=values(content, "misfit_standard_errors"),
             scatter=or_none(values)(content, "scatter_standard_errors"),
             agreement_of_tests=or_none(number)(content, "agreement_of_tests"),
+            median_distances=numbers(content, "median_distances"),
+            cautions=texts(content, "cautions"),
             tests=tuple(FittedTest.from_dict(test) for test in objects(content, "tests")),
             bound=BoundReport.from_dict(member(content, "bound"), bound),
             checks={words(each, "test"): SubspaceCheck.from_dict(each) for each in objects(content, "subspace_check")},

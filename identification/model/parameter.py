@@ -35,7 +35,9 @@ class Parameter:
 
     @property
     def label(self) -> str:
-        """In words, with the unit of what is no gain: zero mode 1, omega [rad/s]; real zero [rad/s]; delay [s]."""
+        """In words, with the unit of what is no gain: zero mode 1, omega [rad/s]; real zero 2 [rad/s]; delay [s]."""
         if self.quantity:
             return f"{self.kind} mode {self.index}, {self.quantity}" + " [rad/s]" * (self.quantity == "omega")
-        return {"gain": "gain", "delay_s": "delay [s]"}.get(self.kind, f"{self.kind.replace('_', ' ')} [rad/s]")
+        which = f" {self.index}" if self.index > 1 else ""
+        root = f"{self.kind.replace('_', ' ')}{which} [rad/s]"
+        return {"gain": "gain", "delay_s": "delay [s]"}.get(self.kind, root)

@@ -47,14 +47,17 @@ class Mode:
     omega
         Natural frequency in rad/s, positive.
     zeta
-        Damping ratio, positive: the factor's roots lie in the open left half plane.
+        Damping ratio, not zero: positive for roots in the open left half plane, negative for the right.
     """
 
     omega: float
     zeta: float
 
     def __post_init__(self) -> None:
-        _positive(omega=self.omega, zeta=self.zeta)
+        _positive(omega=self.omega)
+        _finite(zeta=self.zeta)
+        if self.zeta == 0:
+            raise InputError("zeta is 0; expected a positive number, or a negative one for the right half plane")
         for name in ("omega", "zeta"):
             object.__setattr__(self, name, float(getattr(self, name)))
 
@@ -66,7 +69,7 @@ class Mode:
     @property
     def roots(self) -> tuple[complex, complex]:
         """The two roots in rad/s, conjugate (zeta < 1) or real."""
-        spread = np.sqrt(complex(self.zeta**2 - 1))
+        spread = np.copysign(1, self.zeta) * np.sqrt(complex(self.zeta**2 - 1))
         # Vieta for the small one: -zeta + spread cancels when zeta is large.
         far = -self.zeta - spread
         return complex(self.omega * far), complex(self.omega / far)
@@ -76,21 +79,21 @@ class Mode:
 class PlantModel:
     """P(s) = gain/s^integrators * prod(zeros)/prod(poles) * exp(-delay_s s), Thesis Eq. (2.20) and (3.1).
 
-    The thesis's class has one integrator and complex modes only; real rigs also have none or two, and a real
-    pole or zero. Every factor is 1 at s = 0.
+    The thesis's class has one integrator and complex modes in the left half plane only; real rigs also have none or
+    two, zeros at s = 0, real poles and zeros, and zeros in the right half plane. Every other factor is 1 at s = 0.
 
     Parameters
     ----------
     gain
         K in output units per input unit and second^integrators, not zero; its sign is the plant's.
     zero_modes, pole_modes
-        Anti-resonances and resonances.
+        Anti-resonances, of negative damping for zeros in the right half plane, and resonances.
     delay_s
         The dead time h = T_d in seconds, not negative. Evaluated exactly, never as a rational function.
     integrators
-        0, 1 or 2.
+        -2 to 2; a negative number counts zeros at s = 0, as a measured velocity or acceleration has.
     real_zeros, real_poles
-        Rates a > 0 in rad/s of factors 1 + s/a.
+        Rates a in rad/s of factors 1 + s/a: positive, or negative for a zero in the right half plane.
 
     Raises
     ------
@@ -114,9 +117,13 @@ class PlantModel:
             raise InputError("the plant's gain is 0; expected any other number")
         if self.delay_s < 0:
             raise InputError(f"delay_s is {self.delay_s:g}; expected zero or a positive number of seconds")
-        if isinstance(self.integrators, bool) or self.integrators not in (0, 1, 2):
-            raise InputError(f"integrators is {shown(self.integrators)}; expected 0, 1 or 2")
-        _positive_rates(real_zeros=self.real_zeros, real_poles=self.real_poles)
+        if isinstance(self.integrators, bool) or self.integrators not in (-2, -1, 0, 1, 2):
+            raise InputError(f"integrators is {shown(self.integrators)}; expected an integer from -2 to 2")
+        _left(real_poles=self.real_poles, pole_modes=self.pole_modes)
+        for rate in self.real_zeros:
+            _finite(**{"a number of real_zeros": rate})
+            if rate == 0:
+                raise InputError("a number of real_zeros is 0; expected any other number (integrators counts s = 0)")
         if self.relative_degree < 0:
             zeros = 2 * len(self.zero_modes) + len(self.real_zeros)
             poles = zeros + self.relative_degree
@@ -145,6 +152,12 @@ class PlantModel:
             found += [Parameter(kind, index, "", rate) for index, rate in enumerate(rates, 1)]
         return (*found, Parameter("delay_s", 1, "", self.delay_s))
 
+    @property
+    def right_zeros(self) -> tuple[complex, ...]:
+        """The zeros in the right half plane, rad/s."""
+        zeros = _roots(self.zero_modes, self.real_zeros)
+        return tuple(zero for zero in zeros if zero.real > 0)
+
     def without_delay(self) -> PlantModel:
         """The delay-free factor G(s) of chapter 2."""
         return replace(self, delay_s=0.0)
@@ -152,22 +165,25 @@ class PlantModel:
     def to_control(self, pade_order: int = 0) -> TransferFunction:
         """P(s) as python-control's transfer function, see :func:`identification.model.python_control.to_control`."""
         zeros, poles = _roots(self.zero_modes, self.real_zeros), _roots(self.pole_modes, self.real_poles)
-        every = [*poles, *[0j] * self.integrators]
-        return to_control(lowest(self.gain, poles, zeros), zeros, every, self.delay_s, pade_order, "P")
+        gain = lowest(self.gain, poles, zeros)
+        zeros, poles = [*zeros, *[0j] * -self.integrators], [*poles, *[0j] * self.integrators]
+        return to_control(gain, zeros, poles, self.delay_s, pade_order, "P")
 
     @classmethod
     def from_control(cls, system: object, delay_s: float = 0.0, integrators: int | None = None) -> PlantModel:
         """The plant of a python-control system and a dead time in seconds.
 
         ``integrators`` says how many of the slowest poles are at s = 0; unless given, those that are there exactly.
+        Zeros at s = 0 are those that are there exactly.
 
         Raises
         ------
         InputError
-            See :func:`identification.model.python_control.from_control`; a root lies right of the imaginary axis, or
-            on it but for poles at s = 0; or rounding hides whether a pole is at s = 0, see :data:`NEAR_ZERO`.
+            See :func:`identification.model.python_control.from_control`; a pole lies right of the imaginary axis; a
+            root lies on it but not at s = 0; or rounding hides whether a pole is at s = 0, see :data:`NEAR_ZERO`.
         """
-        gain, zeros, found = from_control(system)
+        gain, every, found = from_control(system)
+        zeros = [zero for zero in every if zero]
         poles = sorted(found, key=abs)
         count = sum(not pole for pole in poles) if integrators is None else integrators
         left = poles[count:]
@@ -177,6 +193,7 @@ class PlantModel:
                 "how many there are"
             )
         (zero_modes, real_zeros), (pole_modes, real_poles) = _factors(zeros), _factors(left)
+        count -= len(every) - len(zeros)
         return cls(lowest(gain, zeros, left), zero_modes, pole_modes, delay_s, count, real_zeros, real_poles)
 
 
@@ -209,7 +226,8 @@ class AdditiveBound:
 
     def __post_init__(self) -> None:
         _positive(gain=self.gain)
-        _positive_rates(real_zeros=self.real_zeros, real_poles=self.real_poles)
+        _left(real_zeros=self.real_zeros, zero_modes=self.zero_modes)
+        _left(real_poles=self.real_poles, pole_modes=self.pole_modes)
         zeros = 2 * len(self.zero_modes) + len(self.real_zeros)
         if not max(1, zeros) <= self.order:
             raise InputError(
@@ -275,10 +293,12 @@ def _factors(roots: Sequence[complex]) -> tuple[tuple[Mode, ...], tuple[float, .
     return modes, tuple(sorted(-root.real for root in roots if root.imag == 0))
 
 
-def _positive_rates(**rates: tuple[float, ...]) -> None:
-    for name, values in rates.items():
+def _left(**roots: tuple[Mode | float, ...]) -> None:
+    """Refuse modes and rates whose roots lie right of the imaginary axis."""
+    for name, values in roots.items():
         for value in values:
-            _positive(**{f"a number of {name}": value})
+            of = {f"zeta of {name}": value.zeta} if isinstance(value, Mode) else {f"a number of {name}": value}
+            _positive(**of)
 
 
 def _quotient(

@@ -171,8 +171,8 @@ def _discretised(plant: PlantModel, sampling_s: float) -> tuple[Complex, Complex
 
 def _chain(plant: PlantModel, sampling_s: float) -> tuple[Complex, Complex]:
     """Generator A (n + 1, n + 1), lower triangular, of w = (u, x) in units of T, and c (n + 1,) with y = c w."""
-    zeros = sampling_s * _roots(plant.zero_modes, plant.real_zeros)
-    poles = [*np.zeros(plant.integrators), *sampling_s * _roots(plant.pole_modes, plant.real_poles)]
+    zeros = [*np.zeros(max(0, -plant.integrators)), *sampling_s * _roots(plant.zero_modes, plant.real_zeros)]
+    poles = [*np.zeros(max(0, plant.integrators)), *sampling_s * _roots(plant.pole_modes, plant.real_poles)]
     sections: list[tuple[complex, complex | None]] = []
     for zero in zeros:
         nearest = int(np.argmin(np.abs(np.array(poles) - zero)))
@@ -194,7 +194,7 @@ def _chain(plant: PlantModel, sampling_s: float) -> tuple[Complex, Complex]:
             size = max(1.0, abs(zero))
             output *= -speed / size
             output[i] = (zero - pole) / size
-            gain *= size / zero
+            gain *= size / zero if zero else -size / sampling_s
     return generator, gain * output
 
 

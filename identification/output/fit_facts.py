@@ -9,17 +9,16 @@ from math import floor, log10
 from identification.base.arrays import Real
 from identification.base.digits import lower_end
 from identification.base.files import is_file, read_bytes
-from identification.fitting.first_guess import BOUNDS
 from identification.fitting.fit_plant import FitResult
 from identification.fitting.single_test_fit import OneFit
 from identification.model.fit_record import Criterion, FitRecord, FittedTest, Noise, Numbers
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.plant import AdditiveBound, Mode
 from identification.model.reports import BoundReport, SubspaceCheck
 from identification.model.structure import in_physical_units
+from identification.output.cautions import cautions
 from identification.sweeps.response import FrequencyResponse
 
 WIDTHS = (28, 12, 26, 11, 11)  # of the columns, at least
-POOR = 0.15  # median distance of a test from its own fit
 
 
 def standard_errors(result: FitResult) -> Numbers:
@@ -28,9 +27,17 @@ def standard_errors(result: FitResult) -> Numbers:
 
 
 def fit_record(
-    tests: Sequence[FrequencyResponse], result: FitResult, report: BoundReport, checks: Mapping[str, SubspaceCheck]
+    tests: Sequence[FrequencyResponse],
+    result: FitResult,
+    report: BoundReport,
+    checks: Mapping[str, SubspaceCheck],
+    reversed_from: float | None,
 ) -> FitRecord:
-    """What model.json records of a fit: its tests' files, and how W_a lies over the residuals."""
+    """What model.json records of a fit: its tests' files, and how W_a lies over the residuals.
+
+    ``reversed_from`` is how far the tests were from a plant before the sign of their phase was reversed; None if it
+    was not.
+    """
     nominal = result.nominal
     how = "each test on its own; mean of the logarithms, mean delay" if nominal.scattered else "one plant for all"
     lower, upper = nominal.intervals
@@ -52,6 +59,9 @@ def fit_record(
         scatter=None if nominal.scatter is None else _numbers(in_physical_units(nominal.theta, nominal.scatter)),
         agreement_of_tests=nominal.agreement,
         tests=tuple(_test_record(test, fit) for test, fit in zip(tests, result.tests, strict=True)),
+        median_distances=result.distances,
+        conjugated=reversed_from is not None,
+        cautions=tuple(cautions(result, tests, reversed_from)),
         bound=report,
         checks=checks,
     )
@@ -70,6 +80,8 @@ def _test_record(test: FrequencyResponse, fit: OneFit) -> FittedTest:
         median_distance=fit.distance,
         sha256=None if file is None else hashlib.sha256(read_bytes(file)).hexdigest(),
         synthetic=test.synthetic,
+        band=(float(test.omega[0]), float(test.omega[-1])),
+        left_out=tuple(map(str, test.left_out)),
     )
 
 
@@ -137,7 +149,10 @@ def remarks(result: FitResult) -> list[str]:
     count = len(result.tests)
     said = [f"{result.structure}; {count} test{'s' if count > 1 else ''}"]
     distance = 100 * max(test.distance for test in result.tests)
-    said.append(f"median distance of a test from its own fit: at most {distance:.2g} % of the response")
+    of_plant = 100 * max(result.distances)
+    said.append(f"median distance of a test from this plant: at most {of_plant:.2g} % of the response")
+    if count > 1:
+        said.append(f"median distance of a test from its own fit: at most {distance:.2g} %")
     if count > 1 and result.nominal.scattered:
         said.append("the tests differ by more than their noise: intervals by Student's distribution of the scatter")
     elif count > 1:
@@ -153,31 +168,6 @@ def remarks(result: FitResult) -> list[str]:
             f"the residuals never become noise, whatever the number of modes: their deviance is divided by "
             f"{result.overdispersion:.3g} in the choice of the structure"
         )
-    return said + cautions(result.plant, distance / 100)
-
-
-def cautions(plant: PlantModel, distance: float) -> list[str]:
-    """Sentences on what in a plant is at the edge of what can be said.
-
-    Parameters
-    ----------
-    plant
-        The nominal plant.
-    distance
-        The largest of the tests' median distances from their own fits, over the response.
-    """
-    said = []
-    if distance > POOR:
-        said.append(f"a median distance of {100 * distance:.2g} % is more than noise leaves on a plant of this class")
-    for kind, modes in (("zero", plant.zero_modes), ("pole", plant.pole_modes)):
-        for i, mode in enumerate(modes, 1):
-            if mode.zeta < 2 * BOUNDS[0]:
-                said.append(
-                    f"{kind} mode {i} has the least damping that is sought: a {kind} in the right half "
-                    "plane, which this class does not have, or one narrower than the lines lie apart"
-                )
-    if plant.delay_s == 0:
-        said.append("no dead time can be told from none")
     return said
 
 
@@ -188,8 +178,11 @@ def digits_of(value: float, width: float) -> int:
     return min(max(2 + floor(log10(value)) - floor(log10(width / 2)), 3), 10)
 
 
-def table(result: FitResult) -> str:
-    """Estimate, 95 % interval, and standard errors by noise and by scatter, a line for each parameter; remarks."""
+def table(result: FitResult, said: Sequence[str]) -> str:
+    """Estimate, 95 % interval, and standard errors by noise and by scatter, a line for each parameter; remarks.
+
+    ``said`` are the cautions.
+    """
     rows = [("parameter", "estimate", "95 % interval", "noise", "scatter")]
     for label, value, lower, upper, noise, scatter in parameter_rows(result):
         digits = max(5, digits_of(max(abs(value), abs(lower), abs(upper)), upper - lower))
@@ -200,4 +193,4 @@ def table(result: FitResult) -> str:
     shown = 5 if len(result.tests) > 1 else 4
     widths = [max(least, *(2 + len(row[k]) for row in rows)) for k, least in enumerate(WIDTHS[:shown])]
     lines = [row[0].ljust(widths[0]) + "".join(map(str.rjust, row[1:shown], widths[1:])) for row in rows]
-    return "\n".join([*lines, *remarks(result)])
+    return "\n".join([*lines, *remarks(result), *said])

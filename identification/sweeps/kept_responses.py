@@ -11,14 +11,20 @@ import numpy as np
 
 from identification.base.errors import InputError
 from identification.base.files import require_readable
-from identification.sweeps.response import FrequencyResponse
+from identification.sweeps.response import FrequencyResponse, LeftOut
 
 CURVES = ("omega", "response", "coherence", "excitation")
 
 
 def write_responses(path: Path, tests: Sequence[FrequencyResponse]) -> None:
-    """Write tests, their raw records left out: the curves of test i as omega_i, response_i and so on."""
+    """Write tests, their raw records left out: the curves of test i as omega_i, response_i and so on,
+    and those of its j-th lines that are left out as omega_i_j and response_i_j.
+    """
     curves = {f"{name}_{i}": getattr(test, name) for i, test in enumerate(tests) for name in CURVES}
+    for i, test in enumerate(tests):
+        curves[f"left_out_{i}"] = np.array([lines.reason for lines in test.left_out], dtype=str)
+        for j, lines in enumerate(test.left_out):
+            curves[f"omega_{i}_{j}"], curves[f"response_{i}_{j}"] = lines.omega, lines.response
     with path.open("wb") as file:  # a path would get another suffix
         np.savez(
             file,
@@ -56,6 +62,10 @@ def read_responses(path: Path) -> list[FrequencyResponse]:
                 content.get(f"excitation_{i}"),
                 synthetic=bool(content["synthetic"][i]),
                 path=Path(str(content["path"][i])) if content["path"][i] else None,
+                left_out=tuple(
+                    LeftOut(content[f"omega_{i}_{j}"], content[f"response_{i}_{j}"], str(reason))
+                    for j, reason in enumerate(content[f"left_out_{i}"])
+                ),
             )
             for i, name in enumerate(content["name"])
         ]

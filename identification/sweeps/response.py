@@ -46,6 +46,28 @@ class Record:
         return f"Record({self.input.size} samples at {1 / self.sampling_s:g} Hz{held})"
 
 
+@dataclass(frozen=True)
+class LeftOut:
+    """Lines of a test that are not used.
+
+    Parameters
+    ----------
+    omega, response
+        (K,) as in :class:`FrequencyResponse`.
+    reason
+        Why, such as "outside the band asked for".
+    """
+
+    omega: Real
+    response: Complex
+    reason: str
+
+    def __str__(self) -> str:
+        low, high = self.omega.min() / (2 * np.pi), self.omega.max() / (2 * np.pi)
+        count = self.omega.size
+        return f"{count} line{'s' if count > 1 else ''} from {low:.4g} to {high:.4g} Hz left out: {self.reason}"
+
+
 @dataclass(frozen=True, repr=False)
 class FrequencyResponse:
     """One test: the response of the plant at M lines.
@@ -69,6 +91,8 @@ class FrequencyResponse:
         What the response was estimated from, or None where the file holds the response.
     path
         The file, or None.
+    left_out
+        Lines that are not used.
     """
 
     omega: Real
@@ -79,6 +103,7 @@ class FrequencyResponse:
     synthetic: bool = False
     record: Record | None = None
     path: Path | None = None
+    left_out: tuple[LeftOut, ...] = ()
 
     def __post_init__(self) -> None:
         omega, response = np.asarray(self.omega, dtype=float), np.asarray(self.response, dtype=complex)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullFormatter
 
-from identification.base.arrays import Real
+from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, PlantModel
@@ -25,6 +25,7 @@ MEASURED: dict[str, Any] = {
     "markeredgewidth": 0,
     "rasterized": True,
 }
+LEFT_OUT = MEASURED | {"color": "#E0A080"}
 MODEL: dict[str, Any] = {"color": "#000000", "linewidth": 0.8}
 BOUND: dict[str, Any] = {"color": "#CC79A7", "linestyle": (0, (7, 2, 1.5, 2)), "linewidth": 1.4}
 TOUCH: dict[str, Any] = {
@@ -82,7 +83,7 @@ def plot_bode(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> Fig
 def draw_magnitude(panel: Axes, tests: Sequence[FrequencyResponse], plant: PlantModel, name: str = "measured") -> None:
     """Draw the magnitude in dB of the tests, so named, and, upon them, of the model."""
     omega = _grid(panel, tests)
-    _scatter(panel, tests, [decibel(np.abs(test.response)) for test in tests], name)
+    _scatter(panel, tests, lambda _, response: decibel(np.abs(response)), name)
     panel.plot(omega, decibel(np.abs(plant(1j * omega))), **MODEL, label="model")
     panel.set_ylabel("Magnitude [dB]")
 
@@ -92,12 +93,12 @@ def draw_phase(panel: Axes, tests: Sequence[FrequencyResponse], plant: PlantMode
     omega = _grid(panel, tests)
     rational_rad = np.unwrap(np.angle(plant.without_delay()(1j * omega)))
     phase_deg = np.degrees(rational_rad - plant.delay_s * omega)
-    measured_deg = [np.degrees(np.angle(test.response)) for test in tests]
-    turns = [
-        np.round((np.interp(test.omega, omega, phase_deg) - measured) / 360)
-        for test, measured in zip(tests, measured_deg, strict=True)
-    ]
-    _scatter(panel, tests, [a + 360 * n for a, n in zip(measured_deg, turns, strict=True)], name)
+
+    def beside_model(at: Real, response: Complex) -> Real:
+        measured_deg = np.degrees(np.angle(response))
+        return np.asarray(measured_deg + 360 * np.round((np.interp(at, omega, phase_deg) - measured_deg) / 360))
+
+    _scatter(panel, tests, beside_model, name)
     panel.plot(omega, phase_deg, **MODEL, label="model")
     low, high = panel.get_ylim()
     enough = [step for step in TURNS_DEG if (high - low) / step <= MOST_TICKS]
@@ -115,8 +116,9 @@ def draw_distance(
 ) -> None:
     """Draw |P - P_test| in dB of every test, |W_a| above them, and a ring where W_a touches them (rad/s)."""
     omega = _grid(panel, tests)
-    distances = [decibel(np.abs(plant(1j * test.omega) - test.response)) for test in tests]
-    _scatter(panel, tests, distances, r"$|P - P_\mathrm{test}|$")
+    distances = _scatter(
+        panel, tests, lambda at, response: decibel(np.abs(plant(1j * at) - response)), r"$|P - P_\mathrm{test}|$"
+    )
     panel.plot(omega, decibel(np.abs(bound(1j * omega))), **BOUND, label="$|W_a|$")
     if touches_omega:
         at = np.array(touches_omega)
@@ -130,8 +132,12 @@ def draw_relative_distance(
 ) -> None:
     """Draw |P - P_test|/|P| in dB of every test and |W_a|/|P|; above 0 dB nothing is known of the plant."""
     omega = _grid(panel, tests)
-    ratios = [decibel(np.abs(1 - test.response / plant(1j * test.omega))) for test in tests]
-    _scatter(panel, tests, ratios, r"$|P - P_\mathrm{test}|/|P|$")
+    ratios = _scatter(
+        panel,
+        tests,
+        lambda at, response: decibel(np.abs(1 - response / plant(1j * at))),
+        r"$|P - P_\mathrm{test}|/|P|$",
+    )
     panel.plot(omega, decibel(np.abs(bound(1j * omega) / plant(1j * omega))), **BOUND, label="$|W_a|/|P|$")
     _leave_out_least(panel, ratios)
     panel.set_ylabel("Relative distance [dB]")
@@ -143,11 +149,12 @@ def decibel(magnitude: Real) -> Real:
 
 
 def _grid(panel: Axes, tests: Sequence[FrequencyResponse]) -> Real:
-    """Make the panel's axis logarithmic, over the band of all tests, and return the points of its lines in rad/s.
+    """Make the panel's axis logarithmic, over all lines of all tests, and return the points of its lines in rad/s.
 
     Below two decades, powers of ten would be too few ticks.
     """
-    low, high = min(test.omega[0] for test in tests), max(test.omega[-1] for test in tests)
+    every = [omega for test in tests for omega in (test.omega, *(lines.omega for lines in test.left_out))]
+    low, high = min(omega.min() for omega in every), max(omega.max() for omega in every)
     panel.set_xscale("log")
     panel.set_xlim(low, high)
     panel.xaxis.set_minor_formatter(NullFormatter())
@@ -159,9 +166,17 @@ def _grid(panel: Axes, tests: Sequence[FrequencyResponse]) -> Real:
     return np.geomspace(low, high, POINTS)
 
 
-def _scatter(panel: Axes, tests: Sequence[FrequencyResponse], values: Sequence[Real], label: str) -> None:
-    for i, (test, value) in enumerate(zip(tests, values, strict=True)):
-        panel.plot(test.omega, value, **MEASURED, label=None if i else label)
+def _scatter(
+    panel: Axes, tests: Sequence[FrequencyResponse], value: Callable[[Real, Complex], Real], label: str
+) -> list[Real]:
+    """Draw a value of each line of the tests, paler where it is left out, and return those that are not."""
+    rest = [lines for test in tests for lines in test.left_out]
+    for i, lines in enumerate(rest):
+        panel.plot(lines.omega, value(lines.omega, lines.response), **LEFT_OUT, label=None if i else "left out")
+    values = [value(test.omega, test.response) for test in tests]
+    for i, (test, found) in enumerate(zip(tests, values, strict=True)):
+        panel.plot(test.omega, found, **MEASURED, label=None if i else label)
+    return values
 
 
 def _leave_out_least(panel: Axes, values: Sequence[Real]) -> None:

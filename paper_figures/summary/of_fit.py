@@ -14,7 +14,7 @@ from identification.model.fit_record import FitRecord
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import AdditiveBound, PlantModel
 from identification.model.reports import BoundReport, SubspaceCheck
-from identification.output.fit_facts import bound_text, cautions, digits_of
+from identification.output.fit_facts import bound_text, digits_of
 from identification.sweeps.response import FrequencyResponse
 from paper_figures.look.captions import number
 
@@ -99,7 +99,7 @@ def paragraphs(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> tu
         ("Structure", _structure(fit)),
         ("Intervals", _intervals(fit)),
         ("Residuals", _residuals(fit)),
-        *(("Caution", said) for said in _cautions(model.plant, fit)),
+        *(("Caution", said) for said in _cautions(fit)),
         *(("Subspace", said) for said in _checks(fit.checks)),
         ("Bound", _bound(model.additive_bound, fit.bound)),
     )
@@ -203,9 +203,8 @@ def _checks(checks: Mapping[str, SubspaceCheck]) -> Iterator[str]:
             yield f"No answer by N4SID from {_few(names)}: {reason}."
 
 
-def _cautions(plant: PlantModel, fit: FitRecord) -> list[str]:
-    distance = max(test.median_distance for test in fit.tests)
-    return [f"{said[0].upper()}{said[1:]}." for said in cautions(plant, distance)]
+def _cautions(fit: FitRecord) -> list[str]:
+    return [f"{said[0].upper()}{said[1:]}." for said in fit.cautions]
 
 
 def _bound(bound: AdditiveBound, report: BoundReport) -> str:

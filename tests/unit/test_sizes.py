@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from identification.__main__ import main
 from identification.base.errors import InputError
 from identification.fitting import grouped_lines
-from identification.fitting.first_guess import group_delay
+from identification.fitting.dead_time import group_delay
 from identification.fitting.fit_plant import fit_plant
 from identification.fitting.grouped_lines import grouped
 from identification.fitting.least_squares import BLOCK, _normal_at, information, log_jacobian, response_of

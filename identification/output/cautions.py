@@ -1,0 +1,123 @@
+"""What a user of a fitted plant must know: misfit, edges of the search, what the data leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from identification.base.arrays import Real
+from identification.fitting.dead_time import same_turn
+from identification.fitting.first_guess import BAND, LEAST_ZETA, most_zeta
+from identification.fitting.fit_plant import FitResult
+from identification.fitting.neighbouring_structures import OUTSIDE
+from identification.fitting.structure_selection import ALIKE
+from identification.model.parameter import Parameter
+from identification.model.plant import PlantModel
+from identification.sweeps.response import FrequencyResponse
+
+POOR = 0.15  # median distance of a test from its own fit
+WORSE = 3.0  # times the distance of a test from its own fit
+AT_EDGE = 0.02  # of the search, a logarithm
+OPEN = 10.0  # ratio of the ends of an interval
+
+
+def cautions(result: FitResult, tests: Sequence[FrequencyResponse], reversed_from: float | None = None) -> list[str]:
+    """Sentences on what a fit to ``tests`` leaves open, the gravest first.
+
+    ``reversed_from`` is as for :func:`identification.output.fit_facts.fit_record`.
+    """
+    edges = _edges(result.plant, np.concatenate([test.omega for test in tests]))
+    return [
+        *_reversed(result, reversed_from),
+        *_misfit(result),
+        *_open(result, edges),
+        *_dead_time(result, tests),
+        *_alike(result),
+    ]
+
+
+def _reversed(result: FitResult, reversed_from: float | None) -> Iterator[str]:
+    if reversed_from is not None:
+        own = max(test.distance for test in result.tests)
+        before = f"as it is at {100 * reversed_from:.2g} %" if np.isfinite(reversed_from) else "as it is not at all"
+        yield (
+            f"the sign of the phase is reversed: the conjugate fits at {100 * own:.2g} %, the response {before}; if a "
+            "lag is negative in these files, the plant is unstable and this is another"
+        )
+
+
+def _misfit(result: FitResult) -> Iterator[str]:
+    own, nominal = max(test.distance for test in result.tests), max(result.distances)
+    if own > POOR and max(test.relative for test in result.tests) > POOR:
+        yield f"a median distance of {100 * own:.2g} % is more than noise leaves on a plant of this class"
+    if nominal > POOR and nominal > WORSE * own:
+        yield (
+            f"the plant is the mean of plants that differ much: it misses a test by {100 * nominal:.2g} %, whose own "
+            f"fit misses it by {100 * own:.2g} % at most; the tests hardly are of one plant"
+        )
+
+
+def _edges(plant: PlantModel, omega: Real) -> dict[str, str]:
+    """By a parameter's name, a sentence about each that is where the search ends or far from the lines."""
+    low, high = float(omega.min()), float(omega.max())
+    said = {}
+    for parameter in plant.parameters:
+        size = abs(parameter.value)
+        if parameter.quantity == "zeta":
+            if size < LEAST_ZETA * (1 + AT_EDGE):
+                said[parameter.name] = (
+                    f"{_name(parameter)} is {size:.3g}, the least that is sought: the resonance is narrower than the "
+                    "lines lie apart, or undamped"
+                )
+            elif size > most_zeta(omega) * (1 - AT_EDGE):
+                said[parameter.name] = f"{_name(parameter)} is {size:.3g}, the largest that is sought"
+        elif parameter.kind not in ("gain", "delay_s") and not low / OUTSIDE < size < high * OUTSIDE:
+            side, end, ideal = ("below", low / BAND, "one at s = 0") if size < low else ("above", high * BAND, "none")
+            where = ", where the search ends" if abs(np.log(size / end)) < AT_EDGE else ""
+            said[parameter.name] = (
+                f"{_name(parameter)} is {size:.4g} rad/s{where}, {side} all lines ({low:.4g} to {high:.4g} rad/s): "
+                f"these data hardly tell it from {ideal}"
+            )
+    return said
+
+
+def _open(result: FitResult, edges: dict[str, str]) -> Iterator[str]:
+    """What is at an edge, and what else has an interval that says nothing."""
+    yield from edges.values()
+    lower, upper = result.nominal.intervals
+    for parameter, low, high in zip(result.plant.parameters, lower, upper, strict=True):
+        ends = sorted((abs(low), abs(high)))
+        if parameter.kind != "delay_s" and parameter.name not in edges and ends[1] > OPEN * ends[0]:
+            yield (
+                f"{_name(parameter)}: the data leave it open between {low:.3g} and {high:.3g}, a factor of "
+                f"{ends[1] / ends[0]:.2g}"
+            )
+
+
+def _dead_time(result: FitResult, tests: Sequence[FrequencyResponse]) -> Iterator[str]:
+    delay_s = result.plant.delay_s
+    if not result.structure.delayed:
+        yield f"no dead time can be told from none; it is at most {result.nominal.intervals[1][-1]:.3g} s"
+    turns = [same_turn(test.omega) for test in tests if test.record is None]
+    if len(turns) == len(tests) and all(turns):
+        turn = max(turn or 0.0 for turn in turns)
+        yield (
+            f"the lines are equally spaced: they do not tell a dead time of {delay_s:.4g} s from that plus any "
+            f"multiple of {turn:.4g} s"
+        )
+
+
+def _alike(result: FitResult) -> Iterator[str]:
+    for structure, more in result.alike.items():
+        if more > -ALIKE:
+            yield f"the data hardly tell this structure from {structure} (its BIC is {more:+.1f})"
+        else:
+            yield (
+                f"the BIC alone would choose {structure} ({more:+.1f}), whose roots outside the band change the "
+                "response by no more than what this class leaves of these data"
+            )
+
+
+def _name(parameter: Parameter) -> str:
+    return parameter.label.split(" [")[0]
