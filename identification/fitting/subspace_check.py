@@ -26,8 +26,9 @@ OVERSAMPLED = 5.0  # sampling frequency over the band's upper end that is kept
 LEAD = 2  # whole intervals of dead time that are left to the model, were the fit's too long
 MARGIN = 8  # states beyond the plant's and those intervals', for the noise and for filters before the converters
 LARGEST_ORDER = 40
-HORIZON = 3  # of past and future rows, in orders
-LONGEST = 65536  # samples; the method's time and memory grow with them
+HORIZON, NARROWEST = 3, 2  # past and future rows, in orders, and how many more than the order they are at least
+SAMPLES = 10  # a row
+HELD = 1_000_000  # numbers of past or future rows: the method's time and memory grow with them
 NEAR = 0.1  # of omega, within which a mode of one model is taken for that of the other
 
 
@@ -52,8 +53,10 @@ def check_modes(plant: PlantModel, record: Record, band_omega: tuple[float, floa
     Notes
     -----
     The record is decimated to OVERSAMPLED times the band, both channels by the same filter without phase, differenced
-    once for each integrator, and given to N4SID. A pole z of the sampled system is one at log(z)/T of the plant's,
-    whether the input is held or band-limited. So are, nearly, the zeros of a band-limited record; for a held one see
+    once for each integrator, and given to N4SID. Of a long one, pieces as long as HELD allows are added up, both
+    channels with the same signs: by superposition the sum is a record of the same plant, and it has the frequencies of
+    all pieces. A pole z of the sampled system is one at log(z)/T of the plant's, whether the input is held or
+    band-limited. So are, nearly, the zeros of a band-limited record; for a held one see
     :func:`identification.model.pulse_response.pulse_zeros`.
 
     Without noise the modes of held sweeps come back to 1e-5. On the six shipped records (synthetic, band-limited, 2.56
@@ -68,36 +71,48 @@ def check_modes(plant: PlantModel, record: Record, band_omega: tuple[float, floa
     factor = max(1, int(2 * np.pi / record.sampling_s / (OVERSAMPLED * band_omega[1])))
     sampling_s = factor * record.sampling_s
     late = max(0, int(plant.delay_s / sampling_s) - LEAD)
-    order = plant.integrators + 2 * len(plant.pole_modes) + len(plant.real_poles) + LEAD + 1 + MARGIN
-    horizon = HORIZON * order
-    samples = record.input.size // factor - late
+    differences = max(0, plant.integrators)
+    order = differences + 2 * len(plant.pole_modes) + len(plant.real_poles) + LEAD + 1 + MARGIN
+    samples = max(0, record.input.size // factor - late - differences)
+    horizon = min(HORIZON * order, samples // SAMPLES)
     if order > LARGEST_ORDER:
-        return SubspaceCheck(order, sampling_s, (), f"more than {LARGEST_ORDER} states")
-    if not 10 * horizon < samples <= LONGEST:
-        return SubspaceCheck(order, sampling_s, (), f"{samples} samples; expected {10 * horizon} to {LONGEST}")
+        return SubspaceCheck(order, sampling_s, (), f"expected a plant that needs {LARGEST_ORDER} states or fewer")
+    if horizon < order + NARROWEST:
+        least = SAMPLES * (order + NARROWEST)
+        after = f" after the dead time of {late}" if late else ""
+        reason = f"the record has {samples} samples of {sampling_s:.3g} s{after}; expected {least} or more"
+        return SubspaceCheck(order, sampling_s, (), reason)
     if find_spec("sippy_unipi") is None:
         return SubspaceCheck(order, sampling_s, (), 'sippy-unipi is missing; pip install "antiwindup-thesis[check]"')
     try:
         with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            u, y = (_prepared(x, factor, plant.integrators) for x in (record.input, record.output))
-            A, B, C, D = _state_space(u[: u.size - late], y[late:], order, horizon)
+            u, y = (_decimated(x, factor, differences) for x in (record.input, record.output))
+            u, y = (_added_up(x, HELD // horizon) for x in (u[: u.size - late], y[late:]))
+            A, B, C, D = _state_space(u, y, order, horizon)
             pencil = np.block([[A, B], [C, D]]), np.diag([1.0] * order + [0.0])
             found = {"zero": _s_plane(eigvals(*pencil), sampling_s), "pole": _s_plane(eigvals(A), sampling_s)}
+            images = pulse_zeros(plant, record.sampling_s) if record.held else None
     except (Exception, SystemExit) as error:
         return SubspaceCheck(order, sampling_s, (), f"{type(error).__name__}: {error}".strip(": "))
-    images = pulse_zeros(plant, record.sampling_s) if record.held else None
     checks = [_nearest("zero", mode, found["zero"], images) for mode in plant.zero_modes]
     checks += [_nearest("pole", mode, found["pole"], None) for mode in plant.pole_modes]
-    inside = [check for check in checks if check.zeta < 1 and band_omega[0] <= check.omega <= band_omega[1]]
+    inside = [check for check in checks if abs(check.zeta) < 1 and band_omega[0] <= check.omega <= band_omega[1]]
     return SubspaceCheck(order, sampling_s, tuple(inside))
 
 
-def _prepared(x: Real, factor: int, differences: int) -> Real:
-    """Decimated without phase, differenced, without mean and of standard deviation 1."""
+def _decimated(x: Real, factor: int, differences: int) -> Real:
+    """Decimated without phase, and differenced."""
     slow = resample_poly(x, 1, factor, padtype="line") if factor > 1 else x
-    slow = np.diff(slow, n=differences)
-    return np.asarray((slow - slow.mean()) / slow.std())
+    return np.asarray(np.diff(slow, n=differences))
+
+
+def _added_up(x: Real, longest: int) -> Real:
+    """The sum of equal pieces of ``x`` with signs by chance, lest periods cancel; no mean, standard deviation 1."""
+    pieces = -(-x.size // longest)
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], pieces)
+    total = signs @ x[: x.size // pieces * pieces].reshape(pieces, -1)
+    return np.asarray((total - total.mean()) / total.std())
 
 
 def _state_space(u: Real, y: Real, order: int, horizon: int) -> tuple[Real, Real, Real, Real]:

@@ -13,7 +13,6 @@ from identification.model.pulse_response import hold
 from identification.sweeps.excited_lines import excited_band, whole_periods
 from identification.sweeps.local_models import (
     COEFFICIENTS,
-    SIGNIFICANT,
     TOGETHER,
     LocalFit,
     Windows,
@@ -21,6 +20,7 @@ from identification.sweeps.local_models import (
     pooled,
     unexplained,
 )
+from identification.sweeps.usable_lines import usable_lines
 
 SHORTEST_WINDOW = COEFFICIENTS + 3  # three degrees of freedom left for the variance
 WINDOWS = 600  # aimed at; a longer record makes longer windows
@@ -30,8 +30,10 @@ BELOW_NYQUIST = 0.8  # of the Nyquist frequency: the part that analysers use; be
 TRUNCATED = 2.0  # F ratio of neighbouring windows together; noise alone gives 1.0 +- 0.3
 EVIDENT = 4.0  # the same, where a transient would cost most of what the windows say about the response
 MATERIAL = 1e-9  # of the output's power
+FEWEST = 9  # lines of a response: three windows
+END, STILL = 200, 0.01  # of the samples, at each end, and motion there over that of the record: it rests
+DRIFTS = 30.0  # of a line's noise: what a drift explains in all windows; one that is not there moves the lowest lines
 APART = 2.0  # variances with and without transient, where the two can be told apart
-WEAKEST = 4.0  # lines whose variance is this much over the median's carry little and would widen a bound
 
 
 @dataclass(frozen=True)
@@ -49,12 +51,19 @@ class SweepEstimate:
     excitation
         (M,) how the error's variance goes from line to line on account of the excitation alone: the variance is
         this times the power density of the noise. Its median is 1.
+    left_omega, left_response
+        (K,) lines that say too little about the plant, see :func:`identification.sweeps.usable_lines.usable_lines`.
+    left_why
+        Which these are and why; empty if there are none.
     """
 
     omega: Real
     response: Complex
     variance: Real
     excitation: Real
+    left_omega: Real
+    left_response: Complex
+    left_why: str
 
 
 def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> SweepEstimate:
@@ -117,22 +126,31 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
     at_nodes: Real = np.concatenate(
         [_frequencies(omega[tile], group.nodes) for tile, group in zip(tiles, groups, strict=True)]
     )
-    fit = _without_drift(groups, [difference[tile] for tile in tiles], u.size, noisy_input=not held)
+    fit, alone = _without_drift(groups, [difference[tile] for tile in tiles], y, noisy_input=not held)
     factor = bend(at_nodes) / (hold(at_nodes, dt) if held else 1.0)
-    gain = fit.gain * np.abs(factor) ** 2
-    carries = gain < WEAKEST * np.median(gain)
+    gain, response = fit.gain * np.abs(factor) ** 2, fit.response * factor
+    usable, left_why = usable_lines(at_nodes, response, gain, alone * np.abs(factor) ** 2, fit.noise)
+    if usable.sum() < FEWEST:
+        raise InputError(
+            f"{usable.sum()} spectral lines tell of the plant; expected {FEWEST} or more (left out: {left_why})"
+        )
     return SweepEstimate(
-        omega=at_nodes[carries],
-        response=(fit.response * factor)[carries],
-        variance=(gain * fit.noise[:, None])[carries],
-        excitation=(gain / np.median(gain))[carries],
+        omega=at_nodes[usable],
+        response=response[usable],
+        variance=(gain * fit.noise[:, None])[usable],
+        excitation=(gain / np.median(gain[usable]))[usable],
+        left_omega=at_nodes[~usable],
+        left_response=response[~usable],
+        left_why=left_why,
     )
 
 
 def _without_drift(
-    groups: Sequence[Windows], differences: Sequence[Complex], samples: int, *, noisy_input: bool
-) -> LocalFit:
+    groups: Sequence[Windows], differences: Sequence[Complex], y: Real, *, noisy_input: bool
+) -> tuple[LocalFit, Real]:
     """The windows' fit after taking out a drift of the output that no local model sees, if there is one.
+
+    The second is the gain (C, 3) without transient, which is the excitation's alone.
 
     An output whose slope differs at the record's two ends, as a double integrator's does, adds b/(1 - 1/z)^2 to its
     spectrum, and one that ends elsewhere than it began a/(1 - 1/z), with real a and b. The differences leave no
@@ -140,23 +158,34 @@ def _without_drift(
     taken out if that explains significantly more, and spares windows the transient or leaves none that needs it.
     """
     truncated, rest = fit_windows(groups, transient=True), fit_windows(groups, transient=False)
-    cut = _needs_transient(truncated, rest, groups, noisy_input=noisy_input)
+    blind = noisy_input or _still(y, float(np.median(truncated.noise)))
+    cut = _needs_transient(truncated, rest, groups, blind=blind)
     chosen = truncated.where(cut, rest)
     power = np.concatenate([np.mean(np.abs(group.output) ** 2, axis=1) for group in groups])
-    noise = np.maximum(pooled(truncated.noise), np.finfo(float).eps ** 2 * power) + np.finfo(float).tiny
+    noise = np.maximum(pooled(chosen.noise), np.finfo(float).eps ** 2 * power) + np.finfo(float).tiny
     usable = ~truncated.resonant
     for _ in range(2):
         if not usable.any():
-            return chosen
+            return chosen, rest.gain
         weights = np.split(usable / noise, np.cumsum([len(group.input) for group in groups])[:-1])
-        moved = _less_drift(groups, differences, weights, samples / (4 * float(np.median(noise))))
+        moved = _less_drift(groups, differences, weights, y.size / (4 * float(np.median(noise))))
         rest_moved = fit_windows(moved, transient=False)
-        if np.sum((rest.left - rest_moved.left) / noise) < SIGNIFICANT:
-            return chosen
+        if np.sum((rest.left - rest_moved.left) / noise) < DRIFTS:
+            return chosen, rest.gain
         usable = ~rest_moved.resonant
     truncated = fit_windows(moved, transient=True)
-    cut_moved = _needs_transient(truncated, rest_moved, moved, noisy_input=noisy_input)
-    return truncated.where(cut_moved, rest_moved) if cut_moved.sum() < cut.sum() or not cut_moved.any() else chosen
+    cut_moved = _needs_transient(truncated, rest_moved, moved, blind=blind)
+    if cut_moved.sum() < cut.sum() or not cut_moved.any():
+        return truncated.where(cut_moved, rest_moved), rest_moved.gain
+    return chosen, rest.gain
+
+
+def _still(y: Real, noise: float) -> bool:
+    """Whether the output rests at both ends of the record, but for white noise of this power density."""
+    moves = np.diff(y) ** 2
+    ends = max(1, moves.size // END)
+    most = STILL**2 * np.mean(moves) + 2 * TRUNCATED * noise / y.size
+    return bool(np.mean(moves[:ends]) < most and np.mean(moves[-ends:]) < most)
 
 
 def _less_drift(
@@ -175,13 +204,15 @@ def _less_drift(
     return [replace(group, output=group.output - drift @ size) for group, drift in zip(groups, drifts, strict=True)]
 
 
-def _needs_transient(truncated: LocalFit, rest: LocalFit, groups: Sequence[Windows], *, noisy_input: bool) -> Flags:
+def _needs_transient(truncated: LocalFit, rest: LocalFit, groups: Sequence[Windows], *, blind: bool) -> Flags:
     """In which windows the transient explains more than noise does: F ratio of neighbouring windows together.
 
     What is left must also be a material part of the output's power: a local model is never quite the response.
     Windows in which response and transient can hardly be told apart follow the nearest others, where the
-    evidence is strong; they have no say of their own if the input is noisy: a transient, which is free of that noise,
-    explains the output better there than the input does.
+    evidence is strong; ``blind`` says that they have no say of their own. A transient, which is free of the input's
+    noise, explains the output better there than a noisy input does. And if the record begins and ends at rest, but the
+    input comes from a controller, what is as smooth as a transient is the loop's reference, a quick sweep:
+    what it leaves is the inverse of the controller.
     """
     power = np.concatenate([np.sum(np.abs(group.output) ** 2, axis=1) for group in groups])
     apart = np.mean(truncated.gain, axis=1) < APART * np.mean(rest.gain, axis=1)
@@ -191,7 +222,7 @@ def _needs_transient(truncated: LocalFit, rest: LocalFit, groups: Sequence[Windo
         ratio = _pooled_ratio(truncated, rest, power, telling)
         nearest = np.argmin(np.abs(np.arange(apart.size)[:, None] - telling), axis=1)
         needs = ratio[nearest] > np.where(apart, TRUNCATED, EVIDENT)
-    if not noisy_input:
+    if not blind:
         needs |= _pooled_ratio(truncated, rest, power, np.arange(apart.size)) > TRUNCATED
     return needs
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.base.arrays import Real, Whole
 
-EXCITED = 0.03  # of the typical power of the excited lines (-15 dB)
+EXCITED = 1e-3  # of the typical power of the excited lines (-30 dB)
 PERIODIC = 0.95  # correlation with itself, periods later, of an input that is repeated
 
 

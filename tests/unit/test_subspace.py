@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from held_plant import PLANTS, held_response
+from scipy.signal import fftconvolve
 
 from data.thesis import model_named
 from identification.fitting.subspace_check import check_modes
@@ -131,9 +132,32 @@ def test_without_its_package_the_check_says_what_to_install(monkeypatch: pytest.
 def test_records_that_give_no_answer() -> None:
     plant = PLANTS["no integrator, real pole"]
     record = _record(plant)
-    short = Record(T, record.input[:300], record.output[:300], True)
-    assert "300 samples; expected 420 to 65536" in str(check_modes(plant, short, BAND))
+    short = Record(T, record.input[:150], record.output[:150], True)
+    assert "the record has 150 samples of 0.002 s; expected 160 or more" in str(check_modes(plant, short, BAND))
+    late = replace(plant, delay_s=10.0)
+    assert "the record has 0 samples of 0.002 s after the dead time of 4998; expected 160" in str(
+        check_modes(late, record, BAND)
+    )
     still = replace(record, output=np.ones_like(record.output))
     assert check_modes(plant, still, BAND).reason is not None
     rich = PlantModel(1.0, (), tuple(Mode(10.0 * k, 0.01) for k in range(1, 16)), 0.0)
-    assert "more than 40 states" in str(check_modes(rich, record, BAND))
+    assert "expected a plant that needs 40 states or fewer" in str(check_modes(rich, record, BAND))
+
+
+@pytest.mark.parametrize("samples", [300, 100_000])
+def test_records_of_any_length(samples: int) -> None:
+    """A short one has fewer rows; of a long one pieces are added up, though each has but a part of the sweep's band."""
+    plant, end = PLANTS["no integrator, real pole"], 0.8 * samples * T
+    t = np.arange(samples) * T
+    u = np.where(t < end, np.sin(2 * np.pi * (5 * t + 40 * t**2 / end)), 0.0)
+    pulse = held_response(plant, T, np.eye(1, min(samples, 3000))[0])
+    y = fftconvolve(u, pulse)[:samples]
+    noise = 1e-3 * np.std(y) * np.random.default_rng(1).standard_normal(samples)
+    omega, zeta = _errors(plant, check_modes(plant, Record(T, u, y + noise, True), BAND))
+    assert max(omega) < 2e-3
+    assert max(zeta) < 0.1
+
+
+def test_a_plant_without_modes_is_answered_too() -> None:
+    plant = replace(PLANTS["no integrator, real pole"], pole_modes=(), integrators=2)
+    assert str(check_modes(plant, _record(plant), BAND)).endswith("the plant has no mode in the band to check")

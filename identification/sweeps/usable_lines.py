@@ -1,0 +1,83 @@
+"""Which lines of an estimated response say something about the plant, and why the others do not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.base.arrays import Complex, Flags, Real
+from identification.sweeps.local_models import TOGETHER, pooled
+
+WEAKEST = 4.0  # a line whose variance is this much over that of others carries little and would widen a bound
+WORTH = 0.1  # error over response of a line that says something, however well the others are known
+DROWNED = 0.5  # error over response from which a band tells of the noise
+
+
+def usable_lines(omega: Real, response: Complex, gain: Real, alone: Real, noise: Real) -> tuple[Flags, str]:
+    """Tell the lines that carry information from those to leave out.
+
+    Parameters
+    ----------
+    omega, response
+        (C, 3) the nodes of C windows, in rad/s, and the response there.
+    gain, alone
+        (C, 3) the variance of its error over the power density of the noise, as it is and as it were if the record
+        cut nothing off at its ends.
+    noise
+        (C,) power density of the noise in each window.
+
+    Returns
+    -------
+    tuple
+        (C, 3) the lines to keep, and a sentence that says which are left out and why; empty if none is.
+
+    Notes
+    -----
+    Errors are compared with the response to find the band in which most octaves are clear; within it a small response
+    is a measurement, as at an anti-resonance. A line that is excited less than those in an octave around it is left
+    out, as at a sweep's ends, where a little of what no model sees does much. So is one that is excited less than most,
+    unless it is as well known as they, relative to the response, or to a tenth: a response that falls by decades is
+    known best where its errors are largest. Noise and response are those of several windows together, so that
+    the noise of a line does not choose it.
+    """
+    typical, excited = pooled(np.median(gain, axis=1)), pooled(np.median(alone, axis=1))
+    power = pooled(np.mean(np.abs(response) ** 2, axis=1))
+    relative = np.maximum(noise, pooled(noise))[:, None] * gain / np.where(power > 0, power, np.inf)[:, None]
+    octaves = np.log(omega[:, -1] / omega[:, 0])
+    first, last = _best_run(np.where(np.median(relative, axis=1) < DROWNED**2, octaves, -octaves))
+    drowned = np.ones(omega.shape, dtype=bool)
+    drowned[first:last] = False
+    torn = ~drowned & (typical > WEAKEST * excited)[:, None]
+    rest = ~drowned & ~torn
+    weak = rest & (gain > WEAKEST * _around(omega[:, 1], np.median(gain, axis=1))[:, None])
+    if rest.any():
+        little = max(WORTH**2, WEAKEST * float(np.median(relative[rest])))
+        weak |= rest & (gain > WEAKEST * np.median(gain[rest])) & (relative > little)
+    reasons = [
+        _band(omega[weak], "which the input excites too little"),
+        _band(omega[torn], "where the response cannot be told from what the record cuts off at its ends"),
+        _band(omega[drowned], "where noise is more than half of the response"),
+    ]
+    return rest & ~weak, "; ".join(filter(None, reasons))
+
+
+def _around(omega: Real, level: Real) -> Real:
+    """Median of ``level`` (C,) in an octave around each of the frequencies ``omega`` (C,), of TOGETHER at least."""
+    here = np.arange(omega.size)
+    first = np.minimum(np.searchsorted(omega, omega / np.sqrt(2)), np.maximum(here - TOGETHER // 2, 0))
+    last = np.maximum(np.searchsorted(omega, omega * np.sqrt(2)), here + TOGETHER // 2 + 1)
+    return np.array([np.median(level[i:j]) for i, j in zip(first, last, strict=True)])
+
+
+def _best_run(worth: Real) -> tuple[int, int]:
+    """Ends of the run of ``worth`` (C,) with the largest sum; an empty one if none is positive."""
+    total = np.concatenate([[0.0], np.cumsum(worth)])
+    gained = total - np.minimum.accumulate(total)
+    last = int(np.argmax(gained))
+    return int(np.argmin(total[: last + 1])), last
+
+
+def _band(omega: Real, why: str) -> str:
+    if not omega.size:
+        return ""
+    low, high = np.min(omega) / (2 * np.pi), np.max(omega) / (2 * np.pi)
+    return f"{omega.size} lines from {low:.4g} to {high:.4g} Hz, {why}"
