@@ -65,7 +65,7 @@ def read_responses(path: Path) -> list[FrequencyResponse]:
                 path=Path(str(content["path"][i])) if content["path"][i] else None,
                 left_out=tuple(
                     LeftOut(content[f"omega_{i}_{j}"], content[f"response_{i}_{j}"], str(reason))
-                    for j, reason in enumerate(content[f"left_out_{i}"])
+                    for j, reason in enumerate(content.get(f"left_out_{i}", ()))
                 ),
                 remarks=tuple(str(content["remarks"][i]).splitlines()) if "remarks" in content else (),
             )
