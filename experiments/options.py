@@ -29,7 +29,7 @@ reference_options = together(
     click.option(
         "--reference",
         type=path_types.INPUT_FILE,
-        help="CSV of time_s and reference, joined by straight lines, instead of the sinusoids.",
+        help="CSV of time_s and reference, joined by straight lines or stepping, instead of the sinusoids.",
     ),
 )
 """Those, and ``--slope`` and ``--reference``."""

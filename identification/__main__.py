@@ -120,6 +120,18 @@ fit_options = together(
         show_default=True,
         help="Of W_a; 2 is Eq. (2.22).",
     ),
+    click.option(
+        "--bound-below",
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="LEVEL",
+        help="Most that plants differ from 0 to the lowest line, in output units per input unit; W_a covers it too.",
+    ),
+    click.option(
+        "--bound-above",
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="LEVEL",
+        help="The same above the lines, up to ten times the highest: from there on W_a falls off like 1/s.",
+    ),
     click.option("--seed", default=0, type=click.IntRange(min=0), show_default=True, help="Of the random restarts."),
 )
 """How a fit is made."""
@@ -144,6 +156,8 @@ def fit(
     band: tuple[float, float] | None,
     loss: str,
     bound_order: int,
+    bound_below: float | None,
+    bound_above: float | None,
     seed: int,
     responses: Path | None,
     **reading: Any,
@@ -164,17 +178,27 @@ def fit(
     with tqdm(desc="fits", unit="", disable=None, leave=False) as bar:
         wanted = Wanted(None if integrators == "auto" else int(integrators), modes, real)
         soft = loss == "soft-l1"
-        fitted = fit_model(tests, wanted, soft=soft, bound_order=bound_order, seed=seed, band=band, tick=bar.update)
+        fitted = fit_model(
+            tests,
+            wanted,
+            soft=soft,
+            bound_order=bound_order,
+            bound_below=bound_below,
+            bound_above=bound_above,
+            seed=seed,
+            band=band,
+            tick=bar.update,
+        )
     text = fitted.model.to_json()
     writers: dict[Path, Callable[[Path], object]] = {output: lambda path: path.write_text(text, encoding="utf-8")}
     if responses is not None:
         writers[responses] = lambda path: write_responses(path, fitted.tests)
     write_whole(writers, inputs=files)
     bound = [bound_text(fitted.model.additive_bound), *bound_remarks(fitted.bound_fit)]
+    remarks = [f"{test.name}: {said}" for test in tests for said in test.remarks]
     left_out = [f"{test.name}: {said}" for test in fitted.record.tests for said in test.left_out]
-    click.echo(
-        "\n".join([table(fitted.plant_fit, fitted.record.cautions), *left_out, *bound, *check_lines(fitted.checks)])
-    )
+    plant = table(fitted.plant_fit, fitted.record.cautions)
+    click.echo("\n".join([plant, *remarks, *left_out, *bound, *check_lines(fitted.checks)]))
 
 
 if __name__ == "__main__":

@@ -60,6 +60,8 @@ def fit_model(
     *,
     soft: bool = False,
     bound_order: int = 2,
+    bound_below: float | None = None,
+    bound_above: float | None = None,
     seed: int = 0,
     band: tuple[float, float] | None = None,
     tick: Tick = lambda: None,
@@ -70,8 +72,9 @@ def fit_model(
     ----------
     tests, wanted, soft, seed, tick
         As for :func:`identification.fitting.fit_plant.fit_plant`.
-    bound_order
-        Number of poles of W_a, see :func:`identification.bound.bound_residuals.bound_residuals`.
+    bound_order, bound_below, bound_above
+        Number of poles of W_a, and levels that it covers beyond the lines, see
+        :func:`identification.bound.bound_residuals.bound_residuals`.
     band
         Lowest and highest frequency in Hz that is used of each test; None leaves out what is noise at both ends, see
         :func:`identification.sweeps.noise_lines.without_noise`.
@@ -91,7 +94,7 @@ def fit_model(
     plants = [test.plant for test in result.tests]
     checks = _checks(used, plants, tick)
     clean = tuple(alias_free(test, result.plant) for test in used)
-    report = bound_residuals(result.plant, clean, plants, bound_order)
+    report = bound_residuals(result.plant, clean, plants, bound_order, below=bound_below, above=bound_above)
     record = fit_record(used, result, report, checks, reversed_from)
     model = IdentifiedModel(result.plant, report.bound, standard_errors(result), record)
     return ModelFit(model, record, result, report, checks, clean)
@@ -125,6 +128,8 @@ def fit(
     integrators: int | None = None,
     soft: bool = False,
     bound_order: int = 2,
+    bound_below: float | None = None,
+    bound_above: float | None = None,
     seed: int = 0,
     band: tuple[float, float] | None = None,
 ) -> IdentifiedModel:
@@ -138,7 +143,7 @@ def fit(
         Zero and pole modes (up to 8 each), real zeros and poles (up to 3 each): one number for both, or a pair.
     integrators
         Poles at s = 0, up to 2; a negative number, down to -2, counts zeros there.
-    soft, bound_order, seed, band
+    soft, bound_order, bound_below, bound_above, seed, band
         As for :func:`fit_model`.
 
     Raises
@@ -150,7 +155,17 @@ def fit(
         raise InputError(f"integrators is {shown(integrators)}; expected an integer from -2 to 2")
     wanted = Wanted(integrators, _pair("modes", modes, MOST_MODES), _pair("real", real, MOST_REAL))
     given = [tests] if isinstance(tests, FrequencyResponse) else tests
-    return fit_model(given, wanted, soft=soft, bound_order=bound_order, seed=seed, band=band).model
+    fitted = fit_model(
+        given,
+        wanted,
+        soft=soft,
+        bound_order=bound_order,
+        bound_below=bound_below,
+        bound_above=bound_above,
+        seed=seed,
+        band=band,
+    )
+    return fitted.model
 
 
 def _pair(name: str, count: int | Sequence[int] | None, most: int) -> tuple[int, int] | None:

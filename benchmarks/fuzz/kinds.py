@@ -220,7 +220,8 @@ RIGHT = {
     **{"until": "0.2", "sample_time": "0.01", "rate": "1000", "anti_windup": "corrected", "amplitude": "50"},
     **{"omegas": "1.5", "a": "4", "e": "2", "f": "1", "period": "4", "epsilon": "1e-4", "method": "tustin"},
     **{"name": "mine", "numerator": "-25", "denominator": "1 25", "modes": "1", "real": "0", "integrators": "1"},
-    **{"bound_order": "1", "seed": "1", "sector": "0.9", "reference": "reference.csv", "loss": "soft-l1"},
+    **{"bound_order": "1", "bound_below": "0.5", "bound_above": "0.1"},
+    **{"seed": "1", "sector": "0.9", "reference": "reference.csv", "loss": "soft-l1"},
 }
 """What an option may be, by the name of its parameter."""
 

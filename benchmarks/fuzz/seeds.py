@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import h5py
 import numpy as np
 import pandas as pd
 import pyarrow
@@ -55,6 +56,9 @@ def sweeps() -> dict[str, bytes]:
         savemat(folder / "sweep.mat", {"omega": omega, "response": response})
         savemat(folder / "record.mat", dict(record.items()), format="4")
         savemat(folder / "squeezed.mat", {"omega": omega, "response": response}, do_compression=True)
+        savemat(folder / "fields.mat", {"data": {"omega": omega, "response": response, "note": "further"}})
+        with h5py.File(folder / "hdf5.mat", "w") as file:
+            file.update({"data/omega": omega, "data/response": response})
         for number, binary in enumerate((0, 1)):
             written = FUNCTION | {"binary": binary, "x": hertz, "data": PLANT(2j * np.pi * hertz)}
             with warnings.catch_warnings():

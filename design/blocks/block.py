@@ -184,8 +184,9 @@ def require_thesis_class(plant: PlantModel, excess: int = 0) -> None:
         )
     if plant.right_zeros:
         zero = min(plant.right_zeros, key=abs)
+        at = f"{zero.real:.4g}" + (f" +- {abs(zero.imag):.4g}j" if zero.imag else "")
         raise InputError(
-            f"the plant has a zero in the right half plane, at {zero:.4g} rad/s; the design expects none, Eq. (2.20): "
+            f"the plant has a zero in the right half plane, at {at} rad/s; the design expects none, Eq. (2.20): "
             "its controller has the plant's zeros as poles"
         )
     zeros, poles = (

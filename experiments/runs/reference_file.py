@@ -8,6 +8,7 @@ import numpy as np
 
 from experiments.runs.references import SampledReference
 from identification.base.errors import InputError
+from identification.formats.columns import digits
 from identification.formats.csv_file import read_columns
 
 COLUMNS = ("time_s", "reference")
@@ -15,6 +16,8 @@ COLUMNS = ("time_s", "reference")
 
 def read_reference(path: Path) -> SampledReference:
     """Read a reference from a CSV with the columns time_s (seconds) and reference (the plant's output unit).
+
+    Two rows of one time are a jump.
 
     Raises
     ------
@@ -25,19 +28,25 @@ def read_reference(path: Path) -> SampledReference:
     if len(tables) > 1:
         raise InputError(f"{path}: holds {len(tables)} tests; expected one reference")
     time_s, values = (tables[0].columns[name] for name in COLUMNS)
-    late = np.flatnonzero(np.diff(time_s) <= 0)
+    step = np.diff(time_s)
+    late = np.flatnonzero((step < 0) | ((step == 0) & (np.roll(step, 1) == 0) & (np.arange(step.size) > 0)))
     if len(late):
-        before, after = time_s[late[0] : late[0] + 2]
+        before, after = digits(*time_s[late[0] : late[0] + 2])
         line = tables[0].numbers[late[0] + 1]
-        raise InputError(f"{path}, line {line}: time_s is {after:.9g} after {before:.9g}; expected increasing times")
+        raise InputError(
+            f"{path}, line {line}: time_s is {after} after {before}; expected increasing times, or two rows of one "
+            "time for a jump"
+        )
     return SampledReference(time_s, values)
 
 
-def _choose(place: str, header: list[str]) -> tuple[str, ...]:
+def _choose(place: str, header: list[str]) -> dict[str, tuple[int, float]]:
     for name in COLUMNS:
         if header.count(name) != 1:
             raise InputError(
                 f"{place}: found {header.count(name)} columns {name} in '{','.join(header)}'; expected one each of "
                 "time_s and reference"
             )
-    return COLUMNS
+    return {name: (header.index(name), 1.0) for name in COLUMNS} | (
+        {"test": (header.index("test"), 1.0)} if "test" in header else {}
+    )

@@ -132,7 +132,8 @@ class SampledReference:
     Parameters
     ----------
     time_s
-        Shape (s,), increasing, in seconds.
+        Shape (s,), in seconds, increasing but for jumps: where two samples have one time, r has the second value from
+        that time on.
     values
         Shape (s,), in the plant's output unit.
     """
@@ -150,8 +151,12 @@ class SampledReference:
             )
         if not (np.isfinite(self.time_s).all() and np.isfinite(self.values).all()):
             raise InputError("the sampled reference is not finite; expected finite numbers")
-        if np.any(np.diff(self.time_s) <= 0):
-            raise InputError("the times of the sampled reference do not increase; expected increasing times")
+        step = np.diff(self.time_s)
+        if np.any(step < 0) or np.any((step[1:] == 0) & (step[:-1] == 0)):
+            raise InputError(
+                "the times of the sampled reference do not increase; expected increasing times, or two samples at one "
+                "time for a jump"
+            )
 
     def __call__(self, time_s: np.ndarray) -> np.ndarray:
         """r at times of any shape."""
@@ -166,7 +171,8 @@ class SampledReference:
         """An integrator and its slope, both set at every sample after t = 0."""
         knots = np.union1d(self.time_s[self.time_s > 0], 0.0)
         levels = self(knots)
-        slopes = np.append(np.diff(levels) / np.diff(knots), 0.0)
+        before = np.interp(-knots[1:], -self.time_s[::-1], self.values[::-1])  # at a jump the first of the two values
+        slopes = np.append((before - levels[:-1]) / np.diff(knots), 0.0)
         if knots[0] < self.time_s[0]:
             slopes[0] = 0.0
         pieces = np.column_stack([levels, slopes])

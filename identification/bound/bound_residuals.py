@@ -9,8 +9,9 @@ import numpy as np
 
 from identification.base.arrays import Real, Whole
 from identification.base.errors import InputError
-from identification.bound.envelope import WIDTH, envelope_of
-from identification.bound.tightest_bound import Points, resonances, shares, tightest
+from identification.bound.beyond import Beyond
+from identification.bound.envelope import WIDTH, Envelope, envelope_of, largest_of
+from identification.bound.tightest_bound import Points, resonances, shares, tightest, within
 from identification.model.plant import HIGHEST_ORDER, AdditiveBound, PlantModel
 from identification.model.reports import BoundReport, Excess, Touch
 from identification.sweeps.response import FrequencyResponse, require_one_band
@@ -38,6 +39,9 @@ def bound_residuals(
     tests: Sequence[FrequencyResponse],
     models: Sequence[PlantModel] | None = None,
     order: int = 2,
+    *,
+    below: float | None = None,
+    above: float | None = None,
 ) -> BoundReport:
     """W_a that covers |P - test| at every line, and on a grid between lines as far as the tests' fits say something.
 
@@ -53,14 +57,16 @@ def bound_residuals(
         Each test's own fit, in the same order; None leaves what is between the lines open.
     order
         Number n of W_a's poles, 1 to HIGHEST_ORDER; there are n - 1 zeros. 2 is the form of (2.22).
+    below, above
+        Levels that W_a covers too, output unit per input unit: one from 0 to the lowest line, one from the highest to
+        ten times it. None asks for nothing there.
 
     Raises
     ------
     InputError
-        An order that is no such number or takes more lines than there are, a number of models that is not the
-        tests', a residual that is not finite, or a plant that meets every test exactly.
-    RuntimeError
-        The bound found does not cover a residual.
+        An order that is no such number or takes more lines than there are, a level that is not positive, a number of
+        models that is not the tests', a residual that is not finite, a plant that meets every test exactly, or
+        residuals too small for numbers that could cover them.
 
     Notes
     -----
@@ -76,13 +82,23 @@ def bound_residuals(
     The excess counts over :func:`identification.bound.envelope.envelope_of`, since single residuals come near zero by
     chance; :func:`identification.bound.tightest_bound.fit_bound` says what is least. It sees one point a bin, and then,
     round by round, the worst points of the bound found, the peaks and notches of the bound itself among them.
+
+    Between the lines W_a follows residuals no deeper than a straight line between neighbours, in logarithms: no notch
+    slips between two lines. Outside the band nothing was measured. There W_a may exceed the envelope's continuation, in
+    proportion to 1/omega below and to omega above, by no more than it exceeds the envelope; and none of its modes has a
+    resonance or a notch of its own there (:class:`identification.bound.shape.Shape`).
+
+    No stable W_a covers an error of an integrator's gain down to 0, where |P| is infinite: ``below`` says that there
+    is none, or how far down it matters, since an error dK is |dK|/omega. Above, W_a keeps the form of (2.22) and falls
+    like 1/s, which no constant level does: from ten times the highest line on ``above`` is left.
     """
     _refuse(tests, models, order)
     lines = _sample([(test.omega, np.abs(plant(1j * test.omega) - test.response)) for test in tests])
     if not lines.residual.any():
         raise InputError("the model meets every test exactly; expected residuals to bound")
-    low, high = lines.omega.min(), lines.omega.max()
-    grid = np.geomspace(low, high, GRID)[1:-1]
+    band = float(lines.omega.min()), float(lines.omega.max())
+    beyond = Beyond(band, below, above)
+    grid = band[0] * np.exp(np.linspace(0.0, np.log(band[1] / band[0]), GRID)[1:-1])
     pairs = () if models is None else tuple(zip(tests, models, strict=True))
 
     def around(test: FrequencyResponse, *models: PlantModel | AdditiveBound) -> Real:
@@ -91,35 +107,43 @@ def bound_residuals(
     gaps = _sample([_apart(plant, *pair, around(*pair)) for pair in pairs])
     envelopes = [envelope_of(sample.omega, sample.residual) for sample in (lines, gaps) if sample.residual.any()]
 
+    omega, largest, _ = largest_of(lines.omega, lines.residual)
+    joined = Envelope(omega[largest > 0], largest[largest > 0])
+
     def points(*parts: tuple[Real, Real]) -> Points:
-        """Residuals at single frequencies, with the envelope of everything."""
-        omega, where = np.unique(np.concatenate([part[0] for part in parts]), return_inverse=True)
-        largest = np.zeros(omega.size)
-        np.maximum.at(largest, where, np.concatenate([part[1] for part in parts]))
-        level = np.max([envelope(omega) for envelope in envelopes], axis=0)
-        return Points(omega[level > 0], largest[level > 0], level[level > 0])
+        """Residuals at single frequencies, with what is asked there besides and the envelope of everything."""
+        omega, largest, _ = largest_of(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+        level = np.max([envelope(np.clip(omega, *band)) for envelope in envelopes], axis=0) * beyond.continued(omega)
+        residual = np.maximum(largest, beyond.asked(omega))
+        least = np.maximum(residual, np.minimum(joined(omega), level))
+        return Points(omega, residual, least, np.maximum(level, residual))
 
     def probe(bound: AdditiveBound) -> Points:
         omega = resonances(bound)
-        omega = omega[(omega > low) & (omega < high)]
         found = _sample([_apart(plant, *pair, omega) for pair in pairs])
         return points((omega, np.zeros(omega.size)), (found.omega, found.residual))
 
-    seen = points((lines.omega, lines.residual), (gaps.omega, gaps.residual), (grid, np.zeros(grid.size)))
-    bound, least_excess = tightest(seen, probe, order)
+    unseen = np.concatenate([grid, beyond.fitted()])
+    apart = gaps.residual > 0
+    between = gaps.omega[apart], gaps.residual[apart]
+    seen = points((lines.omega, lines.residual), between, (unseen, np.zeros(unseen.size)))
+    bound, least_excess = tightest(seen, probe, band, order)
     gaps = _sample([_apart(plant, *pair, _peaks(bound, plant, *pair, around(*pair, bound))) for pair in pairs])
-    bound, touches = _touching(bound, lines, gaps, [test.name for test in tests])
-    every = seen.joined(probe(bound))
-    over = _excess(bound, every.omega, every.envelope)
-    apart = [_excess(bound, envelope.omega, envelope.level) for envelope in envelopes]
+    omega = beyond.around(bound)
+    bound, touches = _touching(bound, lines, gaps, (omega, beyond.asked(omega)), [test.name for test in tests])
+    every = seen.joined(probe(bound)).joined(points((omega[omega > 0], np.zeros(np.count_nonzero(omega)))))
+    inside = every.of(within(every.omega, band))
+    largest_excess = _excess(bound, every.omega, every.envelope).largest
+    each = [_excess(bound, envelope.omega, envelope.level) for envelope in envelopes]
     return BoundReport(
         bound=bound,
-        largest_excess=over.largest,
-        mean_excess=over.mean,
-        least_excess=min(least_excess, over.largest),
-        at_lines=apart[0],
-        between_lines=apart[1] if len(apart) > 1 else None,
+        largest_excess=largest_excess,
+        mean_excess=_excess(bound, inside.omega, inside.envelope).mean,
+        least_excess=min(least_excess, largest_excess),
+        at_lines=each[0],
+        between_lines=each[1] if len(each) > 1 else None,
         touches=touches,
+        outside=beyond.report(bound),
     )
 
 
@@ -167,17 +191,18 @@ def _sample(residuals: Sequence[tuple[Real, Real]]) -> _Sample:
 
 
 def _touching(
-    bound: AdditiveBound, lines: _Sample, gaps: _Sample, names: Sequence[str]
+    bound: AdditiveBound, lines: _Sample, gaps: _Sample, levels: tuple[Real, Real], names: Sequence[str]
 ) -> tuple[AdditiveBound, tuple[Touch, ...]]:
-    """The bound with the least gain that covers, and where it touches; raises RuntimeError if it does not cover."""
+    """The bound with the least gain that covers, levels given at frequencies too, and which residuals it touches."""
     omega = np.concatenate([lines.omega, gaps.omega])
     residual = np.concatenate([lines.residual, gaps.residual])
     test = np.concatenate([lines.test, gaps.test])
-    bound = replace(bound, gain=bound.gain * float(np.max(residual / np.abs(bound(1j * omega)))) * (1 + MARGIN))
+    short = max(float(np.max(size / np.abs(bound(1j * at)))) for at, size in ((omega, residual), levels))
+    bound = replace(bound, gain=bound.gain * short * (1 + MARGIN))
     ratio, some = np.full(omega.size, np.inf), residual > 0
     ratio[some] = np.abs(bound(1j * omega[some])) / residual[some]
     if not np.all(ratio >= 1):
-        raise RuntimeError(f"the additive bound misses a residual by a factor {1 / ratio.min():.3g}")
+        raise InputError(f"residuals of {residual.max():.3g} at most leave no digits for a bound; expected other units")
     touches: list[Touch] = []
     for i in np.argsort(ratio, kind="stable")[: np.count_nonzero(ratio <= 1 + NEAR)]:
         if all(abs(np.log(omega[i] / touch.omega)) > WIDTH for touch in touches):

@@ -53,18 +53,26 @@ def envelope_of(omega: Real, residual: Real) -> Envelope:
     sides, if it is narrower than WIDTH or holds fewer than RESIDUALS. A residual is the length of a random complex
     number; single ones come near zero by chance, and a bound need not follow them down. A window that holds
     RESIDUALS is as wide as the lines are apart, so sparse tests, tests on different lines, and a single test need
-    nothing of their own.
+    nothing of their own. Where all are zero the level is that between the nearest others, or of the nearest one.
     """
-    frequencies, where, count = np.unique(omega, return_inverse=True, return_counts=True)
-    largest = np.zeros(frequencies.size)
-    np.maximum.at(largest, where, residual)
+    frequencies, largest, count = largest_of(omega, residual)
     level = np.full(frequencies.size, largest.max())
     # windows that are the narrowest to begin somewhere, and, seen from the other end, the narrowest to end there
     for side in (slice(None), slice(None, None, -1)):
         distance = np.abs(np.log(frequencies[side] / frequencies[side][0]))
         level[side] = np.minimum(level[side], _closed(distance, largest[side], count[side]))
     held = level > 0
+    level[[0, -1]] = level[held][[0, -1]]
+    held[[0, -1]] = True
     return Envelope(frequencies[held], level[held])
+
+
+def largest_of(omega: Real, residual: Real) -> tuple[Real, Real, Whole]:
+    """The different frequencies (K,) of (M,), the largest residual at each, and the number of residuals there."""
+    frequencies, where, count = np.unique(omega, return_inverse=True, return_counts=True)
+    largest = np.zeros(frequencies.size)
+    np.maximum.at(largest, where, residual)
+    return frequencies, largest, count
 
 
 def _closed(x: Real, values: Real, count: Whole) -> Real:

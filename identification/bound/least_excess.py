@@ -42,7 +42,9 @@ class LeastExcess:
     proved: float
 
 
-def least_largest_excess(omega: Real, residual: Real, envelope: Real, order: int) -> LeastExcess:
+def least_largest_excess(
+    omega: Real, residual: Real, envelope: Real, order: int, programs: int = PROGRAMS
+) -> LeastExcess:
     """Among all W_a of an order with |W_a| >= residual, one whose largest ratio to the envelope is nearly the least.
 
     Parameters
@@ -53,6 +55,8 @@ def least_largest_excess(omega: Real, residual: Real, envelope: Real, order: int
         (K,) in one unit. The envelope is positive and at least the residual; a residual of 0 asks for nothing.
     order
         n, the number of poles; there are n - 1 zeros.
+    programs
+        Most linear programs that are solved; each order takes some four for a proof.
 
     Notes
     -----
@@ -68,9 +72,10 @@ def least_largest_excess(omega: Real, residual: Real, envelope: Real, order: int
     roots may lie on the axis. Polynomials are in y = (x - x0)/(x + x0), which maps
     0 to infinity onto -1 to 1; N has the factor 1 - y, which makes it one degree smaller.
     """
-    centre = float(np.sqrt(omega[0]) * np.sqrt(omega[-1]))
+    half = float(np.sqrt(omega[-1] / omega[0]))  # of the band, from its centre; in ratios no unit is rounded
+    centre = omega[0] * half
     y = _mapped(omega / centre)
-    far = _mapped(np.concatenate([omega[0] / centre / FAR, omega[-1] / centre * FAR]))
+    far = _mapped(np.concatenate([1 / half / FAR, half * FAR]))
     seen = residual > FAINT * envelope
     largest = envelope.max()
     asked, allowed = (np.where(seen, residual, 0.0) / largest) ** 2, (envelope / largest) ** 2
@@ -85,7 +90,7 @@ def least_largest_excess(omega: Real, residual: Real, envelope: Real, order: int
     bottom = np.ones(y.size)
     top, reached = covering(1 - y, bottom)
     step, proved = STEP, float(np.any(residual >= envelope))
-    for _ in range(PROGRAMS):
+    for _ in range(programs):
         target = reached / (1 + step) ** 2
         if target <= 1:
             break

@@ -8,12 +8,17 @@ from identification.base.arrays import Complex, Real
 from identification.model.plant import AdditiveBound, Mode
 
 OUTSIDE = 10.0  # poles and zeros lie up to this factor outside the band
+NEARBY = 3.0  # and none of them far outside without need
 DAMPING = 1e-3  # least of modes; the most is that of two real roots as far apart as frequencies go
 REAL = 1e-7  # relative imaginary part below which a root counts as real
 
 
 class Shape:
     """log |W_a| over theta (2n,), the logarithms of: gain; omega and zeta of each mode, rate; zeros before poles.
+
+    Where nothing was measured no mode has a resonance or a notch: zeta^2 + r^2 >= 1, where r < 1 is the ratio of its
+    frequency and the nearer edge of the band. Above the band its magnitude then has no extremum, and below it none
+    that rises or falls faster than in proportion to omega.
 
     Parameters
     ----------
@@ -29,6 +34,7 @@ class Shape:
     """
 
     def __init__(self, order: int, low: float, high: float) -> None:
+        self.band = low, high
         self.frequencies = low / OUTSIDE, high * OUTSIDE
         dampings = DAMPING, OUTSIDE * np.sqrt(high / low) / 2
         self.counts = ((order - 1) // 2, (order - 1) % 2), (order // 2, order % 2)
@@ -37,6 +43,32 @@ class Shape:
             rows += [self.frequencies, dampings] * modes + [self.frequencies] * reals
         with np.errstate(divide="ignore"):
             self.bounds = np.log(rows)
+        (zero_modes, real_zeros), (pole_modes, _) = self.counts
+        poles = 1 + 2 * zero_modes + real_zeros
+        self._modes = np.append(1 + 2 * np.arange(zero_modes), poles + 2 * np.arange(pole_modes))
+
+    def damped(self, theta: Real) -> Real:
+        """Theta within its bounds, with the damping of modes outside the band raised to what they have to have."""
+        theta = np.clip(theta, *self.bounds.T)
+        omega = np.exp(theta[self._modes])
+        near = np.minimum(1.0, np.minimum(omega / self.band[0], self.band[1] / omega))
+        with np.errstate(divide="ignore"):
+            theta[self._modes + 1] = np.maximum(theta[self._modes + 1], np.log1p(-(near**2)) / 2)
+        return theta
+
+    def damping(self, theta: Real) -> tuple[Real, Real]:
+        """log(zeta^2 + r^2) (2m,) of the m modes for both edges, none of which may be negative, and (2m, 2n) slopes."""
+        low, high = np.log(self.band)
+        loss, values, slopes = 2 * theta[self._modes + 1], [], []
+        for sign, edge in ((1, low), (-1, high)):
+            near = sign * 2 * (theta[self._modes] - edge)
+            value, slope = np.logaddexp(loss, near), np.zeros((self._modes.size, theta.size))
+            rows = np.arange(self._modes.size)
+            slope[rows, self._modes] = sign * 2 * np.exp(near - value)
+            slope[rows, self._modes + 1] = 2 * np.exp(loss - value)
+            values.append(value)
+            slopes.append(slope)
+        return np.concatenate(values), np.vstack(slopes)
 
     def log(self, theta: Real, omega: Real) -> Real:
         """log |W_a| (M,) at omega (M,) in rad/s."""
@@ -62,16 +94,31 @@ class Shape:
                 found.append((sign, 1 + u, [-2 * u]))
         return found
 
-    def bound(self, theta: Real) -> AdditiveBound:
-        """W_a itself."""
+    def distance(self, theta: Real) -> tuple[float, Real]:
+        """How far roots lie more than NEARBY outside the band, squares of logarithms summed, and its slope (2n,)."""
+        low, high = np.log(self.band) + np.log([1 / NEARBY, NEARBY])
+        split = np.zeros(theta.size)
+        split[self._modes] = np.arcsinh(np.exp(theta[self._modes + 1]))  # that of two real roots, nearly
+        rates = np.setdiff1d(np.arange(1, theta.size), self._modes + 1)
+        slow, fast = (theta + sign * split for sign in (-1, 1))
+        under, over = np.maximum(low - slow[rates], 0.0), np.maximum(fast[rates] - high, 0.0)
+        slope = np.zeros(theta.size)
+        slope[rates] = 2 * (over - under)
+        each = np.zeros(theta.size)
+        each[rates] = 2 * (over + under)
+        slope[self._modes + 1] = each[self._modes] * np.tanh(split[self._modes])
+        return float(under @ under + over @ over), slope
+
+    def bound(self, theta: Real, frequency: float = 1.0, level: float = 1.0) -> AdditiveBound:
+        """W_a itself, of theta in these units."""
         values = iter(np.exp(theta).tolist())
         gain = next(values)
         sides = []
         for modes, reals in self.counts:
-            pairs = tuple(Mode(next(values), next(values)) for _ in range(modes))
-            sides.append((pairs, tuple(next(values) for _ in range(reals))))
+            pairs = tuple(Mode(frequency * next(values), next(values)) for _ in range(modes))
+            sides.append((pairs, tuple(frequency * next(values) for _ in range(reals))))
         (zero_modes, real_zeros), (pole_modes, real_poles) = sides
-        return AdditiveBound(gain, zero_modes, pole_modes, real_zeros, real_poles)
+        return AdditiveBound(level * gain, zero_modes, pole_modes, real_zeros, real_poles)
 
     def parameters(self, zeros: Complex, poles: Complex) -> Real:
         """Theta (2n,) of gain 1 from the roots (n - 1,) and (n,) of |W_a|^2 in omega^2, (rad/s)^2."""

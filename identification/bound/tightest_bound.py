@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from scipy.optimize import Bounds, minimize
 
-from identification.base.arrays import Real, Whole
+from identification.base.arrays import Flags, Real, Whole
 from identification.bound.least_excess import least_largest_excess
-from identification.bound.shape import OUTSIDE, Shape
+from identification.bound.shape import NEARBY, OUTSIDE, Shape
 from identification.model.plant import AdditiveBound, PlantModel
 
 ALLOWANCE = 0.05  # share of the least largest excess that is given away for a smaller mean
-BEYOND = np.geomspace(1.0, OUTSIDE, 21)[1:]  # times the band's edges
 BINS = 200  # equal in log frequency, each with one point to begin with and one more a round where it is needed
+DISTANCE = float(np.log1p(ALLOWANCE) / np.log(OUTSIDE / NEARBY) ** 2)  # a root at OUTSIDE costs ALLOWANCE of the mean
 ROUNDS = 12
+BITS = 24  # of what is fitted
 TIGHT = 1e-3  # share by which W_a may miss a residual or exceed the largest excess in between
 ANGLES = 128  # equal ones on the circle that a mode draws in the complex plane, whose own peak they miss by 0.01 %
+PROGRAMS = 40  # linear ones for a start
 ITERATIONS = 100
 PRECISION = 1e-7  # in the logarithm of the excess
+
+Band = tuple[float, float]
+"""Its edges in rad/s."""
 
 
 @dataclass(frozen=True)
@@ -31,29 +36,34 @@ class Points:
     Parameters
     ----------
     omega
-        (K,) rad/s, increasing; the first and the last are the band's edges.
+        (K,) rad/s, increasing.
     residual
-        (K,) that |W_a| has to cover, output unit per input unit; 0 asks for nothing.
+        (K,) of tests, and levels given, that |W_a| has to cover, output unit per input unit; 0 asks for nothing.
+    least
+        (K,) that |W_a| is to reach besides: the residual, or more where nothing was measured between two lines.
     envelope
-        (K,) over which the excess counts, positive and at least the residual.
+        (K,) over which the excess counts, positive and at least the others.
     """
 
     omega: Real
     residual: Real
+    least: Real
     envelope: Real
 
-    def of(self, index: Whole) -> Points:
+    def of(self, index: Whole | Flags) -> Points:
         """Some of the points."""
-        return Points(self.omega[index], self.residual[index], self.envelope[index])
+        return Points(*(getattr(self, each.name)[index] for each in fields(self)))
 
     def joined(self, other: Points) -> Points:
         """Both, in increasing frequency."""
-        omega, first = np.unique(np.concatenate([self.omega, other.omega]), return_index=True)
-        residual = np.concatenate([self.residual, other.residual])[first]
-        return Points(omega, residual, np.concatenate([self.envelope, other.envelope])[first])
+        _, first = np.unique(np.concatenate([self.omega, other.omega]), return_index=True)
+        names = [each.name for each in fields(self)]
+        return Points(*(np.concatenate([getattr(self, name), getattr(other, name)])[first] for name in names))
 
 
-def tightest(seen: Points, probe: Callable[[AdditiveBound], Points], order: int) -> tuple[AdditiveBound, float]:
+def tightest(
+    seen: Points, probe: Callable[[AdditiveBound], Points], band: Band, order: int
+) -> tuple[AdditiveBound, float]:
     """The W_a of :func:`fit_bound` for more points than that could take at once, and a proved limit to tightness.
 
     Parameters
@@ -62,6 +72,8 @@ def tightest(seen: Points, probe: Callable[[AdditiveBound], Points], order: int)
         All that has to be covered.
     probe
         What else has to be covered where a bound has its own peaks and notches.
+    band
+        Both edges are among the frequencies seen. Of what lies outside all is fitted from the start.
     order
         n, the number of poles.
 
@@ -77,33 +89,39 @@ def tightest(seen: Points, probe: Callable[[AdditiveBound], Points], order: int)
     bound misses a residual or exceeds the largest excess of the points fitted, and fit again. What is proved for
     fewer points holds for all.
     """
-    edges = np.log(seen.omega[[0, -1]])
-    chosen = seen.of(np.union1d(_largest(seen.omega, seen.residual, edges), [0, seen.omega.size - 1]))
+    first = _largest(seen.omega, seen.residual, band)
+    chosen = seen.of(np.union1d(first, np.flatnonzero((seen.omega <= band[0]) | (seen.omega >= band[1]))))
     for _ in range(ROUNDS):
-        bound = fit_bound(chosen, order)
+        bound = fit_bound(chosen, band, order)
         every = seen.joined(probe(bound))
         magnitude, fitted = np.abs(bound(1j * every.omega)), np.abs(bound(1j * chosen.omega))
-        worst = np.maximum(every.residual / magnitude, magnitude / every.envelope / np.max(fitted / chosen.envelope))
-        missing = _largest(every.omega, worst, edges)
+        worst = np.maximum(every.least / magnitude, magnitude / every.envelope / np.max(fitted / chosen.envelope))
+        missing = _largest(every.omega, worst, band)
         missing = missing[worst[missing] > 1 + TIGHT]
         if not missing.size:
             break
         chosen = chosen.joined(every.of(missing))
-    return bound, least_largest_excess(chosen.omega, chosen.residual, chosen.envelope, order).proved
+    asked = chosen.of((chosen.residual > 0) | within(chosen.omega, band))
+    return bound, least_largest_excess(asked.omega, asked.residual, asked.envelope, order).proved
 
 
-def fit_bound(points: Points, order: int) -> AdditiveBound:
+def fit_bound(points: Points, band: Band, order: int) -> AdditiveBound:
     """A W_a of an order that covers the points tightly, with the least gain that does.
 
     Parameters
     ----------
     points
         The residuals and their envelope.
+    band
+        Where the mean counts; both edges are among the points.
     order
         n, the number of poles; there are n - 1 zeros.
 
     Notes
     -----
+    All is computed over the highest frequency of the band and the largest residual, and to BITS, so that units do not
+    matter: in others the same numbers are fitted, but for what rounding has moved across a half of the last bit.
+
     :func:`identification.bound.least_excess.least_largest_excess` comes near the least largest excess there is and
     gives its roots. From these, moved to where poles and zeros may be, two searches in the logarithms of gain,
     frequencies and dampings (sequential quadratic programming, which finds local minima): for the least largest excess
@@ -111,40 +129,36 @@ def fit_bound(points: Points, order: int) -> AdditiveBound:
     it. One frequency may decide the largest excess, such as a deep notch of the envelope, and leave the rest of W_a
     free: on six tests of one plant and for order 2, the bound of least largest excess has a needle of zeta = 0.007
     beside the residuals' peak, and 5 % above that the mean no longer gains (zeta = 0.028).
-
-    Beyond the band, where nothing was measured, |W_a| may exceed the envelope's continuation, in proportion to
-    omega above and to 1/omega below, by no more than it exceeds the envelope: no resonance goes where no data are.
     """
-    low, high, nothing = points.omega[0], points.omega[-1], np.zeros(BEYOND.size)
-    omega = np.concatenate([low / BEYOND[::-1], points.omega, high * BEYOND])
-    envelope = np.concatenate([points.envelope[0] * BEYOND[::-1], points.envelope, points.envelope[-1] * BEYOND])
-    residual = np.concatenate([nothing, points.residual, nothing])
-    weight = np.concatenate([nothing, shares(np.log(points.omega)), nothing])
-    ideal = least_largest_excess(omega, residual, envelope, order)
-    shape = Shape(order, float(low), float(high))
-    log_envelope, seen = np.log(envelope), residual > 0
-    log_residual = np.log(residual[seen])
+    unit, size = band[1], float(points.least.max())
+    omega, least, envelope = (_rounded(of) for of in (points.omega / unit, points.least / size, points.envelope / size))
+    ideal = least_largest_excess(omega, least, envelope, order, PROGRAMS)
+    shape = Shape(order, float(_rounded(np.array([band[0] / unit]))[0]), 1.0)
+    inside, weight = within(points.omega, band), np.zeros(omega.size)
+    weight[inside] = shares(np.log(omega[inside]))
+    log_envelope, seen = np.log(envelope), least > 0
+    log_least = np.log(least[seen])
 
     def covering(theta: Real) -> tuple[Real, float]:
         """Parameters within their bounds whose gain just covers, and their largest log excess."""
-        theta = np.clip(theta, *shape.bounds.T)
-        theta[0] += np.max(log_residual - shape.log(theta, omega)[seen])
+        theta = shape.damped(theta)
+        theta[0] += np.max(log_least - shape.log(theta, omega)[seen])
         return theta, float(np.max(shape.log(theta, omega) - log_envelope))
 
     def mean(theta: Real) -> float:
-        return float(weight @ (shape.log(theta, omega) - log_envelope))
+        return float(weight @ (shape.log(theta, omega) - log_envelope)) + DISTANCE * shape.distance(theta)[0]
 
     def slack(theta: Real, largest: float) -> Real:
         log = shape.log(theta, omega)
-        return np.concatenate([log[seen] - log_residual, largest + log_envelope - log])
+        return np.concatenate([log[seen] - log_least, largest + log_envelope - log, shape.damping(theta)[0]])
 
     def slack_slope(theta: Real) -> Real:
         slope = shape.slope(theta, omega)
-        return np.vstack([slope[seen], -slope])
+        return np.vstack([slope[seen], -slope, shape.damping(theta)[1]])
 
     theta, largest = covering(shape.parameters(ideal.zeros, ideal.poles))
-    relaxes = np.concatenate([np.zeros(seen.sum()), np.ones(omega.size)])
-    least = _search(
+    relaxes = np.concatenate([np.zeros(seen.sum()), np.ones(omega.size), np.zeros(shape.damping(theta)[0].size)])
+    found = _search(
         lambda p: float(p[-1]),
         lambda p: np.eye(p.size)[-1],
         np.append(theta, largest),
@@ -152,12 +166,12 @@ def fit_bound(points: Points, order: int) -> AdditiveBound:
         lambda p: slack(p[:-1], p[-1]),
         lambda p: np.column_stack([slack_slope(p[:-1]), relaxes]),
     )
-    theta, largest = min((theta, largest), covering(least[:-1]), key=lambda pair: pair[1])
+    theta, largest = min((theta, largest), covering(found[:-1]), key=lambda pair: pair[1])
     limit = largest + np.log1p(ALLOWANCE)
     flatter, its_largest = covering(
         _search(
             mean,
-            lambda p: weight @ shape.slope(p, omega),
+            lambda p: weight @ shape.slope(p, omega) + DISTANCE * shape.distance(p)[1],
             theta,
             shape.bounds,
             lambda p: slack(p, limit),
@@ -166,7 +180,12 @@ def fit_bound(points: Points, order: int) -> AdditiveBound:
     )
     if its_largest <= limit + TIGHT and mean(flatter) < mean(theta):
         theta = flatter
-    return shape.bound(theta)
+    return shape.bound(theta, unit, size)
+
+
+def within(omega: Real, band: Band) -> Flags:
+    """Whether each frequency (M,) lies in the band."""
+    return np.asarray((omega >= band[0]) & (omega <= band[1]))
 
 
 def shares(x: Real) -> Real:
@@ -184,12 +203,18 @@ def resonances(*models: PlantModel | AdditiveBound) -> Real:
     )
 
 
-def _largest(omega: Real, values: Real, edges: Real) -> Whole:
-    """Where the largest value of each bin is; the bins that hold nothing are left out."""
-    bins = np.linspace(edges[0], edges[1], BINS + 1)[1:-1]
-    where = np.searchsorted(bins, np.log(omega), side="right")
+def _largest(omega: Real, values: Real, band: Band) -> Whole:
+    """Where the largest value of each bin is, and of what is below and above; those that hold nothing are left out."""
+    bins = np.linspace(0.0, np.log(band[1] / band[0]), BINS + 1)[1:-1]
+    where = np.searchsorted(bins, np.log(omega / band[0]), side="right")
+    where[omega < band[0]], where[omega > band[1]] = -1, BINS
     order = np.lexsort((values, where))
     return np.asarray(order[np.append(np.diff(where[order]) > 0, True)])
+
+
+def _rounded(values: Real) -> Real:
+    mantissa, exponent = np.frexp(values)
+    return np.asarray(np.ldexp(np.round(np.ldexp(mantissa, BITS)), exponent - BITS))
 
 
 def _search(

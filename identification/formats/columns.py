@@ -16,11 +16,13 @@ from identification.base.errors import InputError
 
 POLAR = (("magnitude_db", "magnitude"), ("phase_deg", "phase_rad"))
 CARTESIAN = ("real", "imag")
-COMPLEX = "response"  # only where a column can hold complex numbers
+COMPLEX = "response"
 FREQUENCIES = ("frequency_hz", "omega")
+FIRST = (*FREQUENCIES, "time_s")
 INPUTS = ("input", "input_held")
 OF_RESPONSE = {*FREQUENCIES, *POLAR[0], *POLAR[1], *CARTESIAN, COMPLEX, "coherence"}
 OF_RECORD = {"time_s", *INPUTS, "output"}
+KNOWN = OF_RESPONSE | OF_RECORD | {"test"}
 
 KINDS = [
     *({frequency, magnitude, phase} for frequency in FREQUENCIES for magnitude in POLAR[0] for phase in POLAR[1]),
@@ -35,6 +37,7 @@ EXCLUSIVE: list[tuple[set[str], ...]] = [
 ]
 MOST_NAMES = 12  # in one sentence
 MOST_CHARACTERS = 40  # of something found
+SHOWN = 0.05  # of a difference that is rounded away
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,8 @@ class Table:
         What the file calls this test, or None if it holds no other.
     synthetic
         The file says of itself that it is synthetic.
+    remarks
+        What the reader left out or changed.
     """
 
     path: Path
@@ -63,6 +68,7 @@ class Table:
     in_lines: bool
     test: str | None = None
     synthetic: bool = False
+    remarks: tuple[str, ...] = ()
 
     def refuse(self, sentence: str) -> NoReturn:
         """Raise InputError with a sentence about the test as a whole."""
@@ -70,7 +76,7 @@ class Table:
 
     def refuse_row(self, row: int, column: str, expected: str, found: str | None = None) -> NoReturn:
         """Raise InputError about the number in one row of a column."""
-        found = f"is {self.columns[column][row]:.10g}" if found is None else found
+        found = f"is {self.columns[column][row]:.15g}" if found is None else found
         if self.in_lines:
             raise InputError(f"{self.path}, {self.at(row, column)}{self._test}: {column} {found}; expected {expected}")
         self.refuse(f"{self.at(row, column)} {found}; expected {expected}")
@@ -100,18 +106,10 @@ def split_tests(table: Table, labels: Sequence[str]) -> list[Table]:
         rows.setdefault(label, []).append(row)
     if len(rows) < 2:
         return [table]
-    return [
-        replace(
-            table,
-            columns={name: values[chosen] for name, values in table.columns.items()},
-            numbers=table.numbers[chosen],
-            test=label,
-        )
-        for label, chosen in rows.items()
-    ]
+    return [replace(rows_of(table, np.array(chosen)), test=label) for label, chosen in rows.items()]
 
 
-def choose_columns(place: str, names: Sequence[str], noun: str, *, may_be_complex: bool) -> list[str]:
+def choose_columns(place: str, names: Sequence[str], noun: str) -> list[str]:
     """The columns among ``names`` that make a test: frequency or time first, ``coherence`` included, ``test`` not.
 
     Raises
@@ -119,13 +117,12 @@ def choose_columns(place: str, names: Sequence[str], noun: str, *, may_be_comple
     InputError
         A column is missing, comes twice, is spelt almost as a known one, or says what another says too.
     """
-    known = (OF_RESPONSE | OF_RECORD | {"test"}) - (set() if may_be_complex else {COMPLEX})
-    spelt = {_bare(name): name for name in known}
+    spelt = {_bare(name): name for name in KNOWN}
     for name in names:
         meant = spelt.get(_bare(name), name)
         if meant != name:
             raise InputError(f"{place}: one of the {noun} is {quoted(name)}; expected '{meant}' or another name")
-    found = [name for name in names if name in known]
+    found = [name for name in names if name in KNOWN]
     for name in found:
         if found.count(name) > 1:
             raise InputError(f"{place}: '{name}' comes twice among the {noun}; expected it once")
@@ -140,10 +137,26 @@ def choose_columns(place: str, names: Sequence[str], noun: str, *, may_be_comple
         more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
         raise InputError(
             f"{place}: the {noun} are {shown}{more}; expected frequency_hz, magnitude_db, phase_deg "
-            f"or frequency_hz, real, imag {'or frequency_hz, response ' if may_be_complex else ''}"
-            "or time_s, input, output (or omega, magnitude, phase_rad, input_held in their place)"
+            "or frequency_hz, real, imag or frequency_hz, response or time_s, input, output "
+            "(or omega, magnitude, phase_rad, input_held in their place), or --columns NAME=OURS"
         )
-    return sorted(chosen, key=lambda name: name not in (*FREQUENCIES, "time_s"))
+    return sorted(chosen, key=lambda name: name not in FIRST)
+
+
+def rows_of(table: Table, rows: Whole) -> Table:
+    """The table with the chosen rows, in their order."""
+    columns = {name: values[rows] for name, values in table.columns.items()}
+    return replace(table, columns=columns, numbers=table.numbers[rows])
+
+
+def digits(found: float, expected: float) -> tuple[str, str]:
+    """Two numbers with ten digits, or with as many more as show by how much they differ."""
+    apart = found - expected
+    for count in range(10, 18):
+        texts = (f"{found:.{count}g}", f"{expected:.{count}g}")
+        if abs(float(texts[0]) - float(texts[1]) - apart) <= SHOWN * abs(apart):
+            break
+    return texts
 
 
 def quoted(text: str) -> str:

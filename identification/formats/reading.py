@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from identification.base.errors import InputError
+from identification.formats.columns import KNOWN, quoted
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -16,13 +19,23 @@ class Reading:
         For a name in the file, of a column, a variable or a field, the name of ours that it stands for, such as
         ``{"Frequency (Hz)": "frequency_hz"}``.
     node, direction
-        Of a universal file, the response's node and direction whose functions are read; None takes those of a file
-        that holds one only.
+        Of a universal file, the response's node and direction whose functions are read, or the reference's where
+        only that varies; None takes those of a file that holds one only.
     resample
         Whether a record with uneven time stamps is brought to an even grid instead of being refused.
+
+    Raises
+    ------
+    InputError
+        ``columns`` holds a name of ours that there is not.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
     node: int | None = None
     direction: int | None = None
     resample: bool = False
+
+    def __post_init__(self) -> None:
+        if unknown := sorted({*self.columns.values()} - KNOWN):
+            names = ", ".join(sorted(KNOWN))
+            raise InputError(f"--columns: {quoted(unknown[0])} is no name of ours; expected one of {names}")

@@ -50,6 +50,45 @@ class Excess:
 
 
 @dataclass(frozen=True)
+class Outside:
+    """W_a where nothing was measured: an assumption, of which the data say no more than what it is at the edges.
+
+    Parameters
+    ----------
+    low, high
+        The lowest and the highest line in rad/s.
+    below, above
+        The levels that W_a was asked to cover there, or None.
+    at_zero, most_below
+        |W_a| at 0, and the largest from there to the lowest line.
+    most_above
+        The largest from the highest line on.
+    falling
+        c in |W_a| = c/omega far above, output unit per input unit times rad/s.
+    """
+
+    low: float
+    high: float
+    below: float | None
+    above: float | None
+    at_zero: float
+    most_below: float
+    most_above: float
+    falling: float
+
+    def __str__(self) -> str:
+        below, above = (
+            "is an assumption" if level is None else f"covers the level of {level:.4g} given"
+            for level in (self.below, self.above)
+        )
+        return (
+            f"nothing was measured below {self.low:.4g} rad/s, where |W_a| {below} (at most {self.most_below:.4g}, "
+            f"{self.at_zero:.4g} at 0), nor above {self.high:.4g} rad/s, where it {above} (at most "
+            f"{self.most_above:.4g}, {self.falling:.4g}/omega far above)"
+        )
+
+
+@dataclass(frozen=True)
 class BoundReport:
     """W_a and how tight it is.
 
@@ -60,7 +99,7 @@ class BoundReport:
         on a grid between the lines.
     largest_excess, mean_excess
         Of |W_a| over the envelope of all residuals, at the lines, at the frequencies between them where W_a is fitted,
-        and around its own modes.
+        and around its own modes; the largest over the envelope's continuation outside the band too.
     least_excess
         No W_a of this order that covers the residuals has a smaller largest excess, as multipliers prove in ball
         arithmetic for the residuals and envelope as computed; 1 says nothing.
@@ -68,7 +107,10 @@ class BoundReport:
         Over the envelope of the tests' residuals at their lines, and over that of their fits' distances between the
         lines; the latter is None without fits, or when none differs from P.
     touches
-        Where W_a is nearly as small as a residual, the closest first; of those side by side only the closest.
+        Where W_a is nearly as small as a residual, the closest first; of those side by side only the closest. There is
+        none where a level given decides W_a's gain.
+    outside
+        W_a beyond the lines; None in a model written before this was recorded.
     """
 
     bound: AdditiveBound
@@ -78,11 +120,14 @@ class BoundReport:
     at_lines: Excess
     between_lines: Excess | None
     touches: tuple[Touch, ...]
+    outside: Outside | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The ``bound`` of what a fit writes: W_a's order in place of W_a, which the model holds."""
         rest = asdict(self)
         del rest["bound"]
+        if self.outside is not None:
+            rest["outside"]["said"] = str(self.outside)
         return {"order": self.bound.order} | rest
 
     @classmethod
@@ -96,6 +141,7 @@ class BoundReport:
             "AdditiveBound": lambda members, key: bound,
             "Excess": excess,
             "Excess | None": or_none(excess),
+            "Outside | None": lambda of, key: None if of.get(key) is None else record(Outside, member(of, key)),
             "tuple[Touch, ...]": lambda members, key: tuple(record(Touch, each) for each in objects(members, key)),
         }
         return record(cls, content, readers)

@@ -108,15 +108,17 @@ def bound_text(bound: AdditiveBound) -> str:
 
 
 def bound_remarks(report: BoundReport) -> list[str]:
-    """Sentences on how W_a lies over the residuals."""
-    first = report.touches[0]
-    where = "between the lines, where only its own fit speaks," if first.between_lines else "at a line"
+    """Sentences on how W_a lies over the residuals, and on what it is where there are none."""
     least = lower_end(report.least_excess, 3)
-    return [
+    said = [
         f"W_a is {report.mean_excess:.3g} times the residuals' envelope on average and {report.largest_excess:.3g} "
-        f"times at most; no W_a of order {report.bound.order} gets below {least}",
-        f"it touches the residual of {first.test} {where} at {first.omega:.4g} rad/s",
+        f"times at most; no W_a of order {report.bound.order} gets below {least}"
     ]
+    if report.touches:
+        first = report.touches[0]
+        where = "between the lines, where only its own fit speaks," if first.between_lines else "at a line"
+        said.append(f"it touches the residual of {first.test} {where} at {first.omega:.4g} rad/s")
+    return said if report.outside is None else [*said, str(report.outside)]
 
 
 def parameter_rows(result: FitResult) -> list[tuple[str, float, float, float, float, float | None]]:

@@ -32,6 +32,7 @@ def write_responses(path: Path, tests: Sequence[FrequencyResponse]) -> None:
             name=[test.name for test in tests],
             path=[str(test.path or "") for test in tests],
             synthetic=[test.synthetic for test in tests],
+            remarks=["\n".join(test.remarks) for test in tests],
             **{name: curve for name, curve in curves.items() if curve is not None},
         )
 
@@ -64,8 +65,9 @@ def read_responses(path: Path) -> list[FrequencyResponse]:
                 path=Path(str(content["path"][i])) if content["path"][i] else None,
                 left_out=tuple(
                     LeftOut(content[f"omega_{i}_{j}"], content[f"response_{i}_{j}"], str(reason))
-                    for j, reason in enumerate(content[f"left_out_{i}"])
+                    for j, reason in enumerate(content.get(f"left_out_{i}", ()))
                 ),
+                remarks=tuple(str(content["remarks"][i]).splitlines()) if "remarks" in content else (),
             )
             for i, name in enumerate(content["name"])
         ]

@@ -93,6 +93,8 @@ class FrequencyResponse:
         The file, or None.
     left_out
         Lines that are not used.
+    remarks
+        What was left out or changed while the test was read.
     """
 
     omega: Real
@@ -104,6 +106,7 @@ class FrequencyResponse:
     record: Record | None = None
     path: Path | None = None
     left_out: tuple[LeftOut, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         omega, response = np.asarray(self.omega, dtype=float), np.asarray(self.response, dtype=complex)

@@ -217,5 +217,5 @@ def _bound(bound: AdditiveBound, report: BoundReport) -> str:
         "lines, as far as was looked, below that of its own fit, "
         f"{number(report.mean_excess)} times their envelope on average and "
         f"{number(report.largest_excess)} times at most (no bound of this order gets below "
-        f"{lower_end(report.least_excess, 3)}). It touches {', '.join(touches)}."
+        f"{lower_end(report.least_excess, 3)})." + (f" It touches {', '.join(touches)}." if touches else "")
     )

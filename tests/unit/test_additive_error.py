@@ -31,7 +31,7 @@ def test_aliases_of_a_held_input_are_no_error(held: bool, error: float) -> None:
 
 
 def test_a_folder_and_a_file_of_two_tests(tmp_path: Path) -> None:
-    rows = [f"{test},{f},-20,{-90 - f}" for test in (1, 2) for f in range(1, 20)]
+    rows = [f"{test},{f},{-20 - test},{-90 - f}" for test in (1, 2) for f in range(1, 20)]
     folder, output = tmp_path / "sweeps", tmp_path / "results"
     folder.mkdir()
     output.mkdir()

@@ -272,7 +272,7 @@ def test_experiments_refuse_a_missing_block(runner: CliRunner, tmp_path: Path, e
     [
         ("frequency_hz,magnitude_db\n1,2\n", ["phase_deg"]),
         ("frequency_hz,magnitude_db,phase_deg\n1,2,3\n2,x,3\n", ["line 3", "'x'"]),
-        ("frequency_hz,magnitude_db,phase_deg\n2,2,3\n1,2,3\n", ["line 3"]),
+        ("frequency_hz,magnitude_db,phase_deg\n2,2,3\n-1,2,3\n", ["line 3"]),
         ("", []),
         ('frequency_hz,magnitude_db,phase_deg\n"1,2,3\n', ["line 2"]),
     ],

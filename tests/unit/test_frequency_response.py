@@ -20,7 +20,7 @@ from identification.sweeps.response import FrequencyResponse
 
 FRF = ["frequency_hz,magnitude_db,phase_deg,coherence"] + [f"{f},{-f},{10 * f},0.9" for f in range(1, 11)]
 RAW = ["time_s,input,output"] + [f"{0.01 * k:.4f},{np.sin(k * k / 500):.6f},{np.sin(k):.6f}" for k in range(200)]
-TWO = ["test,frequency_hz,real,imag"] + [f"{t},{f},7,{f}" for t in (7, "b") for f in range(1, 9)]
+TWO = ["test,frequency_hz,real,imag"] + [f"{t},{f},{r},{f}" for t, r in ((7, 7), ("b", 8)) for f in range(1, 9)]
 UNITS = [
     *(
         [f, m, p]
@@ -114,23 +114,24 @@ def test_one_label_is_no_part_of_the_name(tmp_path: Path) -> None:
 
 
 def test_files_and_folders_in_their_order(tmp_path: Path) -> None:
-    for name in ("b.csv", "a.CSV", ".hidden.csv", "notes.txt"):
-        _write(tmp_path, FRF, f"folder/{name}")
+    for k, name in enumerate(("b.csv", "a.CSV", ".hidden.csv", "notes.txt", "c.tsv", "d.lvm", "../0.txt")):
+        _write(tmp_path, [FRF[0], *(f"{f},{k},0,0.9" for f in range(1, 9))], f"folder/{name}")
     (tmp_path / "folder" / "c.csv").mkdir()
-    last = _write(tmp_path, FRF, "0.txt")
-    assert [path.name for path in input_files([tmp_path / "folder", last])] == ["a.CSV", "b.csv", "0.txt"]
-    assert [test.name for test in read_sweeps([str(tmp_path / "folder"), last])] == ["a.CSV", "b.csv", "0.txt"]
+    names = ["a.CSV", "b.csv", "c.tsv", "d.lvm", "0.txt"]
+    assert [path.name for path in input_files([tmp_path / "folder", tmp_path / "0.txt"])] == names
+    assert [test.name for test in read_sweeps([str(tmp_path / "folder"), tmp_path / "0.txt"])] == names
 
 
 def test_equal_base_names_are_told_apart(tmp_path: Path) -> None:
-    paths = [_write(tmp_path, FRF, name) for name in ("monday/1.csv", "tuesday/1.csv", "tuesday/2.csv")]
+    names = ("monday/1.csv", "tuesday/1.csv", "tuesday/2.csv")
+    paths = [_write(tmp_path, FRF[: 9 + k], name) for k, name in enumerate(names)]
     assert [test.name for test in read_sweeps(paths)] == ["monday/1.csv", "tuesday/1.csv", "2.csv"]
 
 
 def test_what_files_are_refused(tmp_path: Path) -> None:
     empty = tmp_path / "empty"
     empty.mkdir()
-    with pytest.raises(InputError, match=r"empty: holds no file that ends in .csv, .mat, .uff, .unv, .58; expected"):
+    with pytest.raises(InputError, match=r"empty: holds no file that ends in .csv, .tsv, .lvm, .mat, .*; expected"):
         input_files([empty])
     path = _write(tmp_path, FRF)
     with pytest.raises(InputError, match=r"sweep.csv: is given twice; expected each file once$"):
@@ -141,9 +142,11 @@ def test_what_files_are_refused(tmp_path: Path) -> None:
 
 
 KINDS = (
-    "expected frequency_hz, magnitude_db, phase_deg or frequency_hz, real, imag or time_s, input, output "
-    "(or omega, magnitude, phase_rad, input_held in their place)"
+    "expected frequency_hz, magnitude_db, phase_deg or frequency_hz, real, imag or frequency_hz, response "
+    "or time_s, input, output (or omega, magnitude, phase_rad, input_held in their place), or --columns NAME=OURS"
 )
+
+UNIFORM = "expected about 0.07 (uniform sampling, within 5 % of an interval), or --resample"
 
 
 @pytest.mark.parametrize(
@@ -154,21 +157,11 @@ KINDS = (
         (FRF[:1], ": holds a header and no numbers; expected a line for each point"),
         # names
         (["frequency_hz,magnitude_db"], f", line 1: the columns are 'frequency_hz', 'magnitude_db'; {KINDS}"),
-        (["omega,magnitude,phase"], f", line 1: the columns are 'omega', 'magnitude', 'phase'; {KINDS}"),
         (["# x", "freq_hz,mag_db"], f", line 2: the columns are 'freq_hz', 'mag_db'; {KINDS}"),
         (["time_s,input"], f", line 1: the columns are 'time_s', 'input'; {KINDS}"),
-        (["frequency_hz,response"], f", line 1: the columns are 'frequency_hz', 'response'; {KINDS}"),
         (
             [",".join("abcdefghijklmnop") + "q" * 50],
             ", line 1: the columns are 'a', 'b', 'c', 'd', 'e', 'f', 'g', 'h', 'i', 'j', 'k', 'l' and 4 more; " + KINDS,
-        ),
-        (
-            ["Frequency_Hz,real,imag"],
-            ", line 1: one of the columns is 'Frequency_Hz'; expected 'frequency_hz' or another name",
-        ),
-        (
-            ["omega,real,imag,Coherence"],
-            ", line 1: one of the columns is 'Coherence'; expected 'coherence' or another name",
         ),
         (["frequency_hz,real,imag,real"], ", line 1: 'real' comes twice among the columns; expected it once"),
         (
@@ -206,7 +199,7 @@ KINDS = (
         (_changed(FRF, 4, "3,1_0,0,0.9"), ", line 4: magnitude_db is '1_0'; expected a finite number"),
         (_changed(FRF, 4, "3,nan,0,0.9"), ", line 4: magnitude_db is 'nan'; expected a finite number"),
         (_changed(FRF, 4, "3,-inf,0,0.9"), ", line 4: magnitude_db is '-inf'; expected a finite number"),
-        (["omega;real;imag", "1;2,5;0"], ", line 2: real is '2,5'; expected a finite number with a decimal point"),
+        (["omega;real;imag", "1;2,5;0.1"], ", line 2: real is '2,5'; expected a finite number with a decimal point"),
         (
             ["omega,real,imag", "1,2,5,0"],
             ", line 2: holds 4 fields; expected 3 as in the header, and decimals with a point",
@@ -219,18 +212,10 @@ KINDS = (
         (_changed(FRF, 4, "3,1e5,0,0.9"), ", line 4: magnitude_db is 100000; expected a number from -1000 to 1000"),
         (_changed(FRF, 4, "1e60,1,0,0.9"), ", line 4: frequency_hz is 1e+60; expected a number up to 1e+50 in size"),
         # frequencies, coherence, response
-        (
-            _changed(FRF, 4, "2,-3,0,0.9"),
-            ", line 4: frequency_hz is 2; expected more than the 2 of line 3 (increasing, no duplicates)",
-        ),
-        (
-            _changed(FRF, 4, "1.5,-3,0,0.9"),
-            ", line 4: frequency_hz is 1.5; expected more than the 2 of line 3 (increasing, no duplicates)",
-        ),
-        (_changed(FRF, 2, "0,-3,0,0.9"), ", line 2: frequency_hz is 0; expected a positive number"),
         (_changed(FRF, 2, "-1,-3,0,0.9"), ", line 2: frequency_hz is -1; expected a positive number"),
         (_changed(FRF, 4, "3,-3,0,1.5"), ", line 4: coherence is 1.5; expected a number from 0 to 1"),
         (_changed(FRF, 4, "3,-3,0,-1e-3"), ", line 4: coherence is -0.001; expected a number from 0 to 1"),
+        (_changed(FRF, 4, "3,-3,0,1.000100001"), ", line 4: coherence is 1.000100001; expected a number from 0 to 1"),
         (FRF[:6], ": holds 5 frequencies; expected 8 or more"),
         (
             ["omega,magnitude,phase_rad", *(f"{f},{5 - f},0" for f in range(1, 11))],
@@ -242,14 +227,7 @@ KINDS = (
         ),
         # tests
         (_changed(TWO, 12, "b,3,1,x"), ", line 12, test b: imag is 'x'; expected a finite number"),
-        (
-            _changed(TWO, 12, "b,2,1,1"),
-            ", line 12, test b: frequency_hz is 2; expected more than the 2 of line 11 (increasing, no duplicates)",
-        ),
-        (
-            _changed(TWO, 12, "7,3,1,1"),
-            ", line 12, test 7: frequency_hz is 3; expected more than the 8 of line 9 (increasing, no duplicates)",
-        ),
+        (_changed(TWO, 12, "b,2,1,1"), ", test b: holds 7 frequencies; expected 8 or more"),
         (_changed(TWO, 12, ",3,1,1"), ", line 12: test is ''; expected a number or a name"),
         (TWO[:12], ", test b: holds 3 frequencies; expected 8 or more"),
         # raw records
@@ -260,11 +238,11 @@ KINDS = (
         ),
         (
             _changed(RAW, 9, None),
-            ", line 9: time_s is 0.08; expected about 0.07 (uniform sampling, within 5 % of an interval)",
+            f", line 9: time_s is 0.08; {UNIFORM}",
         ),
         (
             _changed(RAW, 9, "0.0712,1,0"),
-            ", line 9: time_s is 0.0712; expected about 0.07 (uniform sampling, within 5 % of an interval)",
+            f", line 9: time_s is 0.0712; {UNIFORM}",
         ),
         (RAW[:100], ": holds 99 samples; expected 128 or more"),
         ([RAW[0], *(f"{k},2,{k % 7}" for k in range(200))], ": the input is 2 throughout; expected a sweep"),
@@ -350,7 +328,9 @@ def _read_or_refused_in_one_line(path: Path) -> bool:
     return True
 
 
-HEADERS = st.sampled_from(["", FRF[0], RAW[0], TWO[0], "omega;magnitude;phase_rad", "frequency_hz,real,imag"])
+HEADERS = st.sampled_from(
+    ["", FRF[0], RAW[0], TWO[0], "omega;magnitude;phase_rad", "# f/kHz, Re(H), Im(H)", "frequency_hz,x,response"]
+)
 CELL = st.one_of(st.floats().map(repr), st.integers().map(str), st.text(max_size=5), st.just(""))
 
 

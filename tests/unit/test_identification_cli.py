@@ -122,7 +122,7 @@ def _refused(result: Result, folder: Path, *words: str) -> None:
         ("time_s,output\n0,1\n", ["bad.csv, line 1", "time_s, input, output"]),
         ("frequency_hz,real,imag\n1,2,x\n", ["bad.csv, line 2", "imag is 'x'", "a finite number"]),
         ("frequency_hz,real,imag\n1,2,nan\n", ["bad.csv, line 2", "imag is 'nan'"]),
-        ("frequency_hz,real,imag\n2,1,1\n1,1,1\n", ["bad.csv, line 3", "frequency_hz is 1"]),
+        ("frequency_hz,real,imag\n2,1,1\n-1,1,1\n", ["bad.csv, line 3", "frequency_hz is -1"]),
         ("frequency_hz,real,imag\n1,1,1\n", ["bad.csv", "holds 1 frequencies", "8 or more"]),
         ("time_s,input,output\n" + "".join(f"{k},1,{k % 5}\n" for k in range(300)), ["the input is 1 throughout"]),
     ],
@@ -147,13 +147,26 @@ def test_data_that_cannot_carry_the_parameters(tmp_path: Path) -> None:
 def test_structure_loss_and_order_of_the_bound_as_asked(tmp_path: Path, sweeps: list[Path]) -> None:
     output = tmp_path / "model.json"
     asked = ["--modes", "1/2", "--real", "1/0", "--integrators", 1, "--loss", "soft-l1", "--bound-order", 3]
-    assert _fit(*sweeps, *asked, "--output", output).exit_code == 0
+    result = _fit(*sweeps, *asked, "--bound-below", 50, "--bound-above", 0.25, "--output", output)
+    assert result.exit_code == 0
+    assert "covers the level of 50 given" in result.stdout
     model = read_model(output)
     assert model.fit.structure == "1 integrator, 1 zero mode, 2 pole modes, 1 real zero"
     assert model.fit.loss == "soft-L1"
     assert model.additive_bound.order == 3
+    assert (model.fit.bound.outside.below, model.fit.bound.outside.above) == (50.0, 0.25)
+    assert model.additive_bound.gain >= 50.0
     assert model.plant.integrators == 1
     assert len(model.plant.real_zeros) == 1
+
+
+@pytest.mark.parametrize("option", ["--bound-below", "--bound-above"])
+@pytest.mark.parametrize("level", ["0", "-1", "nan", "inf", "x"])
+def test_a_level_that_is_none(tmp_path: Path, sweeps: list[Path], option: str, level: str) -> None:
+    result = _fit(sweeps[0], "--modes", 1, "--real", 0, f"{option}={level}", "--output", tmp_path / "model.json")
+    assert result.exit_code == 2
+    assert "Traceback" not in result.stderr
+    assert not (tmp_path / "model.json").exists()
 
 
 @pytest.mark.parametrize("option", ["--modes", "--real"])
