@@ -20,6 +20,7 @@ from identification.sweeps.local_models import (
     pooled,
     unexplained,
 )
+from identification.sweeps.response import LeftOut
 from identification.sweeps.usable_lines import usable_lines
 
 SHORTEST_WINDOW = COEFFICIENTS + 3  # three degrees of freedom left for the variance
@@ -51,19 +52,15 @@ class SweepEstimate:
     excitation
         (M,) how the error's variance goes from line to line on account of the excitation alone: the variance is
         this times the power density of the noise. Its median is 1.
-    left_omega, left_response
-        (K,) lines that say too little about the plant, see :func:`identification.sweeps.usable_lines.usable_lines`.
-    left_why
-        Which these are and why; empty if there are none.
+    left_out
+        Lines that say too little about the plant, see :func:`identification.sweeps.usable_lines.usable_lines`.
     """
 
     omega: Real
     response: Complex
     variance: Real
     excitation: Real
-    left_omega: Real
-    left_response: Complex
-    left_why: str
+    left_out: tuple[LeftOut, ...]
 
 
 def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> SweepEstimate:
@@ -94,6 +91,9 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
     The response is given at the three zeros of the cubic orthogonal on the window's lines: there the errors of
     a quadratic fitted by least squares are uncorrelated, so that nothing of the record is lost, and the
     cubic term leaves no bias. Windows do not overlap. An input that repeats itself is used at the lines of its period.
+
+    Under feedback the input answers the output's noise, too: where that is not small against what the reference does,
+    the response errs towards the inverse of the controller.
 
     A second integrator goes on drifting after the first difference: see :func:`_without_drift`.
     """
@@ -129,19 +129,16 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
     fit, alone = _without_drift(groups, [difference[tile] for tile in tiles], y, noisy_input=not held)
     factor = bend(at_nodes) / (hold(at_nodes, dt) if held else 1.0)
     gain, response = fit.gain * np.abs(factor) ** 2, fit.response * factor
-    usable, left_why = usable_lines(at_nodes, response, gain, alone * np.abs(factor) ** 2, fit.noise)
+    usable, left_out = usable_lines(at_nodes, response, gain, alone * np.abs(factor) ** 2, fit.noise)
     if usable.sum() < FEWEST:
-        raise InputError(
-            f"{usable.sum()} spectral lines tell of the plant; expected {FEWEST} or more (left out: {left_why})"
-        )
+        why = "; ".join(map(str, left_out))
+        raise InputError(f"{usable.sum()} spectral lines tell of the plant; expected {FEWEST} or more ({why})")
     return SweepEstimate(
         omega=at_nodes[usable],
         response=response[usable],
         variance=(gain * fit.noise[:, None])[usable],
         excitation=(gain / np.median(gain[usable]))[usable],
-        left_omega=at_nodes[~usable],
-        left_response=response[~usable],
-        left_why=left_why,
+        left_out=left_out,
     )
 
 

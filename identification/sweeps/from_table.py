@@ -173,6 +173,7 @@ def from_record(table: Table, name: str, *, resample: bool) -> FrequencyResponse
         None,
         name,
         excitation=estimate.excitation,
+        left_out=estimate.left_out,
         synthetic=table.synthetic,
         record=record,
         path=table.path,

@@ -6,13 +6,16 @@ import numpy as np
 
 from identification.base.arrays import Complex, Flags, Real
 from identification.sweeps.local_models import TOGETHER, pooled
+from identification.sweeps.response import LeftOut
 
 WEAKEST = 4.0  # a line whose variance is this much over that of others carries little and would widen a bound
 WORTH = 0.1  # error over response of a line that says something, however well the others are known
 DROWNED = 0.5  # error over response from which a band tells of the noise
 
 
-def usable_lines(omega: Real, response: Complex, gain: Real, alone: Real, noise: Real) -> tuple[Flags, str]:
+def usable_lines(
+    omega: Real, response: Complex, gain: Real, alone: Real, noise: Real
+) -> tuple[Flags, tuple[LeftOut, ...]]:
     """Tell the lines that carry information from those to leave out.
 
     Parameters
@@ -28,7 +31,8 @@ def usable_lines(omega: Real, response: Complex, gain: Real, alone: Real, noise:
     Returns
     -------
     tuple
-        (C, 3) the lines to keep, and a sentence that says which are left out and why; empty if none is.
+        (C, 3) the lines to keep, and those to leave out by the reason. Lines beyond both ends of the band that the input
+        excites are neither.
 
     Notes
     -----
@@ -46,18 +50,20 @@ def usable_lines(omega: Real, response: Complex, gain: Real, alone: Real, noise:
     first, last = _best_run(np.where(np.median(relative, axis=1) < DROWNED**2, octaves, -octaves))
     drowned = np.ones(omega.shape, dtype=bool)
     drowned[first:last] = False
-    torn = ~drowned & (typical > WEAKEST * excited)[:, None]
-    rest = ~drowned & ~torn
-    weak = rest & (gain > WEAKEST * _around(omega[:, 1], np.median(gain, axis=1))[:, None])
-    if rest.any():
+    torn = np.broadcast_to((typical > WEAKEST * excited)[:, None], omega.shape)
+    weak = gain > WEAKEST * _around(omega[:, 1], np.median(gain, axis=1))[:, None]
+    if (rest := ~drowned & ~torn).any():
         little = max(WORTH**2, WEAKEST * float(np.median(relative[rest])))
-        weak |= rest & (gain > WEAKEST * np.median(gain[rest])) & (relative > little)
-    reasons = [
-        _band(omega[weak], "which the input excites too little"),
-        _band(omega[torn], "where the response cannot be told from what the record cuts off at its ends"),
-        _band(omega[drowned], "where noise is more than half of the response"),
-    ]
-    return rest & ~weak, "; ".join(filter(None, reasons))
+        weak |= (gain > WEAKEST * np.median(gain[rest])) & (relative > little)
+    kept = rest & ~weak
+    ends = omega[kept][[0, -1]] if kept.any() else omega.ravel()[[0, -1]]
+    reasons = {
+        "the input excites them too little": weak & (omega >= ends[0]) & (omega <= ends[1]),
+        "the response cannot be told there from what the record cuts off at its ends": torn & ~drowned & ~weak,
+        "noise is more than half of the response": drowned & ~weak,
+    }
+    left_out = (LeftOut(omega[lines], response[lines], why) for why, lines in reasons.items() if lines.any())
+    return kept, tuple(left_out)
 
 
 def _around(omega: Real, level: Real) -> Real:
@@ -74,10 +80,3 @@ def _best_run(worth: Real) -> tuple[int, int]:
     gained = total - np.minimum.accumulate(total)
     last = int(np.argmax(gained))
     return int(np.argmin(total[: last + 1])), last
-
-
-def _band(omega: Real, why: str) -> str:
-    if not omega.size:
-        return ""
-    low, high = np.min(omega) / (2 * np.pi), np.max(omega) / (2 * np.pi)
-    return f"{omega.size} lines from {low:.4g} to {high:.4g} Hz, {why}"
