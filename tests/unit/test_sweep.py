@@ -238,15 +238,24 @@ def test_a_sweep_over_three_decades() -> None:
     np.testing.assert_allclose(estimate.response, over_hold(plant, 5 * DT, estimate.omega), rtol=1e-4)
 
 
-def test_units_do_not_matter() -> None:
-    plant, u = PLANTS["integrator"], _sweep(2**12)
-    y = held_response(plant, DT, u) + 1e-3 * np.random.default_rng(10).standard_normal(u.size)
-    plain = estimate_response(DT, u, y, held=True)
-    scaled = estimate_response(1e6 * DT, 1e-20 * u, 1e20 * y, held=True)
-    np.testing.assert_allclose(scaled.omega, 1e-6 * plain.omega, rtol=1e-12)
-    np.testing.assert_allclose(scaled.response, 1e40 * plain.response, rtol=1e-9)
-    np.testing.assert_allclose(scaled.variance, 1e80 * plain.variance, rtol=1e-9)
-    np.testing.assert_allclose(scaled.excitation, plain.excitation, rtol=1e-9)
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+@pytest.mark.parametrize("kind", ["sweep", "noise", "itself"])
+def test_units_and_signs_do_not_matter(kind: str, noise: float) -> None:
+    """Input, output and time in units up to 45 decades apart, either sign; exact records too, and y = u, where nothing
+    is left at all. What rounding leaves of an exact record is no variance that two units share.
+    """
+    u = _sweep(2**11, 20.0, 200.0) if kind == "sweep" else np.random.default_rng(14).standard_normal(2**11)
+    y = u if kind == "itself" else held_response(PLANTS["integrator"], DT, u)
+    y = y + noise * np.std(y) * np.random.default_rng(10).standard_normal(u.size)
+    with np.errstate(over="raise", divide="raise", invalid="raise"):
+        plain = estimate_response(DT, u, y, held=True)
+        for step, of_u, of_y in ((1e30, 1.0, -1.0), (1e-30, 1e-30, 1e30), (1.0, -1e45, 1e-45), (1.0, 1e-45, 1e45)):
+            other = estimate_response(step * DT, of_u * u, of_y * y, held=True)
+            np.testing.assert_allclose(other.omega * step, plain.omega, rtol=1e-12)
+            np.testing.assert_allclose(other.response, plain.response * (of_y / of_u), rtol=1e-6)
+            np.testing.assert_allclose(other.excitation, plain.excitation, rtol=1e-5)
+            if noise:
+                np.testing.assert_allclose(other.variance, plain.variance * (of_y / of_u) ** 2, rtol=1e-5)
 
 
 LOOP = PlantModel(11.8, (Mode(15.7, 0.05),), (Mode(19.5, 0.3),), 3e-3, 1)
