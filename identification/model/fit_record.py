@@ -87,6 +87,8 @@ class FittedTest:
         Its lowest and highest line, in rad/s.
     left_out
         Lines that were not used, in sentences.
+    remarks
+        What was left out or changed while the test was read.
     """
 
     name: str
@@ -101,6 +103,7 @@ class FittedTest:
     synthetic: bool
     band: tuple[float, float]
     left_out: tuple[str, ...]
+    remarks: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """An entry of ``tests``."""
@@ -110,6 +113,7 @@ class FittedTest:
             "noise": asdict(self.noise),
             "band": list(self.band),
             "left_out": list(self.left_out),
+            "remarks": list(self.remarks),
         }
 
     @classmethod

@@ -54,7 +54,7 @@ def test_json_there_and_back() -> None:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"integrators": 3}, "integrators is 3; expected 0, 1 or 2"),
+        ({"integrators": 3}, "integrators is 3; expected an integer from -2 to 2"),
         ({"integrators": True}, "integrators is True"),
         ({"real_zeros": 3.0}, "'real_zeros' is 3.0; expected a list of numbers"),
         ({"real_poles": [-1.0]}, "real_poles is -1; expected a positive number"),

@@ -84,7 +84,7 @@ def test_blocks_of_lines_are_added() -> None:
     response = value * (1 + 0.1 * np.sin(omega))
     rows = value[:, None] * log_jacobian(structure, theta, omega) / sigma[:, None]
     residual = (value - response) / sigma
-    cost, slope, curvature = _normal_at(theta, (1, 1, 1, 0, 0), omega, response, sigma, False)
+    cost, slope, curvature = _normal_at(theta, structure.counts, omega, response, sigma, False)
     assert cost == pytest.approx(np.sum(np.abs(residual) ** 2))
     np.testing.assert_allclose(slope, (rows.conj().T @ residual).real, rtol=1e-9, atol=1e-9 * cost)
     for found in (curvature, information(structure, theta, omega, sigma)):
