@@ -20,7 +20,7 @@ import click
 from identification.base.command_line import CommandGroup, together
 from identification.base.files import require_writable, write_whole
 from identification.base.path_types import INPUT, OUTPUT_FILE
-from identification.model.plant import HIGHEST_ORDER
+from identification.model.additive_bound import HIGHEST_ORDER
 
 
 class Counts(click.ParamType):  # type: ignore[type-arg]  # generic in the newest click only

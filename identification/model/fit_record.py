@@ -18,7 +18,8 @@ from identification.base.json_object import (
     truth,
     words,
 )
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.plant import PlantModel
 from identification.model.plant_json import from_shape, plant_from_dict, plant_to_dict, shaped
 from identification.model.reports import BoundReport, SubspaceCheck
 

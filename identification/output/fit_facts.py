@@ -11,8 +11,9 @@ from identification.base.digits import lower_end
 from identification.base.files import is_file, read_bytes
 from identification.fitting.fit_plant import FitResult
 from identification.fitting.one_fit import OneFit
+from identification.model.additive_bound import AdditiveBound
 from identification.model.fit_record import Criterion, FitRecord, FittedTest, Noise, Numbers
-from identification.model.plant import AdditiveBound, Mode
+from identification.model.modes import Mode
 from identification.model.reports import BoundReport, SubspaceCheck
 from identification.model.structure import in_physical_units
 from identification.output.cautions import cautions

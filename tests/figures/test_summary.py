@@ -20,9 +20,11 @@ from design.design_file import Design
 from design.hinf.mixed_sensitivity import Synthesis
 from design.parameters import DelayFreeParameters, ExtendedParameters, RollOff
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.fit_record import Criterion, FitRecord, FittedTest, Noise
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.reports import BoundReport, Excess, ModeCheck, SubspaceCheck, Touch
 from identification.model.structure import Structure
 from identification.sweeps.response import FrequencyResponse

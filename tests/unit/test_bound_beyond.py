@@ -14,7 +14,9 @@ from identification.base.errors import InputError
 from identification.bound.bound_residuals import bound_residuals
 from identification.bound.envelope import envelope_of
 from identification.bound.shape import Shape
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.reports import BoundReport
 from identification.output.fit_facts import bound_remarks
 from identification.sweeps.response import FrequencyResponse

@@ -10,8 +10,10 @@ import pytest
 
 from design.blocks.block import bound_block, plant_block
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel, read_model
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.plant_json import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
 
 S = 1j * np.geomspace(0.1, 100, 50)

@@ -25,7 +25,8 @@ from identification.formats import mat_level_5, sizes
 from identification.formats.csv_file import read_csv
 from identification.formats.mat_file import read_mat
 from identification.formats.reading import Reading
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.structure import Structure
 from identification.sweeps import estimate_response as module
 from identification.sweeps import from_table as reader
