@@ -26,7 +26,8 @@ from experiments.engine.simulate import simulate
 from experiments.runs.design_loop import design_loop
 from experiments.thesis.printed_choices import thesis_reference
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 OMEGA = 1.5  # of the reference, rad/s
 HORIZON_S = 30.0

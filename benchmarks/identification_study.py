@@ -32,7 +32,8 @@ from data.thesis import model_named
 from identification.base.errors import InputError
 from identification.fitting.fit_plant import fit_plant
 from identification.fitting.least_squares import log_jacobian
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.structure import Structure
 from identification.sweeps.response import FrequencyResponse
 

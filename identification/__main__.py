@@ -20,7 +20,7 @@ import click
 from identification.base.command_line import CommandGroup, together
 from identification.base.files import require_writable, write_whole
 from identification.base.path_types import INPUT, OUTPUT_FILE
-from identification.model.plant import HIGHEST_ORDER
+from identification.model.additive_bound import HIGHEST_ORDER
 
 
 class Counts(click.ParamType):  # type: ignore[type-arg]  # generic in the newest click only
@@ -195,10 +195,9 @@ def fit(
         writers[responses] = lambda path: write_responses(path, fitted.tests)
     write_whole(writers, inputs=files)
     bound = [bound_text(fitted.model.additive_bound), *bound_remarks(fitted.bound_fit)]
-    remarks = [f"{test.name}: {said}" for test in tests for said in test.remarks]
-    left_out = [f"{test.name}: {said}" for test in fitted.record.tests for said in test.left_out]
-    plant = table(fitted.plant_fit, fitted.record.cautions)
-    click.echo("\n".join([plant, *remarks, *left_out, *bound, *check_lines(fitted.checks)]))
+    of_tests = [f"{test.name}: {said}" for test in fitted.record.tests for said in (*test.remarks, *test.left_out)]
+    plant = [table(fitted.plant_fit), *fitted.record.cautions]
+    click.echo("\n".join([*plant, *of_tests, *bound, *check_lines(fitted.checks)]))
 
 
 if __name__ == "__main__":

@@ -22,7 +22,8 @@ from design.chapters_3_4.design_extended import design_extended
 from experiments.campaign.distributions import RUNS
 from experiments.campaign.seal import SEAL, Seal
 from identification.fit_model import fit_model
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.structure import Wanted
 from identification.sweeps.kept_responses import write_responses
 from identification.sweeps.read_sweeps import read_sweeps

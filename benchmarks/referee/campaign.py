@@ -11,7 +11,8 @@ from benchmarks.referee.winding import OnTheLine, around, characteristic
 from experiments.campaign.draw_plants import PlantsWithin
 from experiments.campaign.linear_stability import PerturbedLoop
 from identification.base.errors import InputError
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.plant import PlantModel
 
 PLANTS = 4
 WITHIN = 1e-6  # |P_true - P|/|W_a| is said to be at most 1: what rounding and our own refinement leave

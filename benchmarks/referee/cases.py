@@ -12,8 +12,10 @@ from design.chapter_2.design_delay_free import design_delay_free
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
 from experiments.runs.references import Reference
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 DELAY_FREE = 4  # every fourth case is a delay-free design
 

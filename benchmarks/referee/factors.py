@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from design.design_file import Design
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.plant import PlantModel
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -18,8 +18,10 @@ from experiments.engine.simulate import simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 SAME = 1e-6  # relative: every number is said to more digits than this, or to four, and searches end far below
 RUN = 1e-8  # of the largest value: 1e-11 of each step's, and what the loop makes of it

@@ -12,7 +12,8 @@ from design.blocks.block import Block, bound_block, from_polynomial, geometric_s
 from design.blocks.frequency_peak import block_norm
 from identification.base.errors import InputError
 from identification.base.json_object import member
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.plant import PlantModel
 
 AT_ZERO = 1e-9  # |1 + theta1~(0)| below this, relative to what it is the difference of, is rounding
 

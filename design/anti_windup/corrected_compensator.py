@@ -13,7 +13,7 @@ from design.blocks.block import Block, bound_block
 from design.blocks.frequency_peak import searched_norm
 from identification.base.arrays import Real, Whole
 from identification.base.errors import InputError
-from identification.model.plant import AdditiveBound
+from identification.model.additive_bound import AdditiveBound
 
 SETTLED = 0.01  # what is left of y_d after the recovery time
 RATES = 48  # values of the rate in a decade

@@ -11,7 +11,7 @@ from design.anti_windup.compensator import AntiWindup, from_one_plus
 from design.blocks.block import Block, bound_block, from_polynomial, geometric_scale
 from design.blocks.frequency_peak import frequency_grid
 from identification.base.arrays import Complex, Real
-from identification.model.plant import AdditiveBound
+from identification.model.additive_bound import AdditiveBound
 
 MARGIN = 2e-4  # by which 1/sector is lowered at most, relative: what lies between the frequencies
 PER_DECADE = 200  # frequencies

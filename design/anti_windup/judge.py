@@ -15,7 +15,8 @@ from design.anti_windup.thesis_compensator import thesis_choice
 from design.blocks.block import Block, bound_block, fastest_root, plant_block
 from design.choices import SECTOR
 from identification.base.json_object import Reader, record
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.plant import PlantModel
 
 
 @dataclass(frozen=True)

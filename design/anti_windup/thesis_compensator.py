@@ -10,7 +10,7 @@ from scipy.optimize import minimize, minimize_scalar
 from design.anti_windup.compensator import second_order, uncertainty_cost
 from design.blocks.block import bound_block
 from design.blocks.frequency_peak import frequency_grid, searched_norm
-from identification.model.plant import AdditiveBound
+from identification.model.additive_bound import AdditiveBound
 
 
 def optimal_gamma(bound: AdditiveBound, alpha: float, beta: float) -> tuple[float, float]:

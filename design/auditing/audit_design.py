@@ -21,7 +21,8 @@ from design.stability.characteristic_roots import CharacteristicRoots, largest_b
 from design.stability.jet import jet
 from design.stability.margins import Margins, delay_loop, margins_of, responses, tracking_floor
 from identification.base.errors import InputError
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.plant import PlantModel
 
 Result = TypeVar("Result")
 

@@ -13,7 +13,9 @@ from numpy.typing import ArrayLike
 from identification.base.arrays import Complex
 from identification.base.errors import InputError, shown
 from identification.base.json_object import number
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.python_control import from_control, to_control
 
 if TYPE_CHECKING:

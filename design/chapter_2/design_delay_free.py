@@ -16,8 +16,9 @@ from design.hinf.mixed_sensitivity import mixed_sensitivity
 from design.hinf.pick import Problem
 from design.parameters import DelayFreeParameters
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.plant import PlantModel
 
 TRACKING = 0.01  # W1 asks for |S| below gamma times this at the reference's frequencies
 

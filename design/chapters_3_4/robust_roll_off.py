@@ -13,7 +13,8 @@ from design.chapters_3_4.interpolate_Q import Conditions
 from design.chapters_3_4.smith_predictor import FreePart, rolled_off, stabiliser
 from design.stability.margins import tracking_floor
 from identification.base.errors import InputError
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.plant import PlantModel
 
 MOST_POLES = 3  # of the roll-off, beyond what the plant's own excess of poles takes
 PER_DECADE = 10

@@ -26,7 +26,8 @@ from design.stability.stable_intervals import (
 )
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.plant import PlantModel
 
 TAIL = 1e-5  # of a peak: what may exceed it beyond the frequencies looked at, or exceed its limit there unseen
 

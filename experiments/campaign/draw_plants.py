@@ -10,7 +10,9 @@ from design.blocks.frequency_peak import frequency_grid
 from experiments.campaign.distance import FIRST, Changes, Factors, at_the_ends, distance, moved, reach
 from experiments.campaign.distance_certificate import stays_below
 from identification.base.errors import InputError
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 LARGEST = np.log(2.0)  # of a parameter's change in logarithms, however loose the bound
 SHORTEST = 0.05  # of its unit, below which a dead time of 0 stays 0; of itself, to which another one shrinks at most

@@ -9,7 +9,8 @@ from fractions import Fraction
 import numpy as np
 
 from identification.base.errors import InputError
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 BITS = 512  # after the point of the integers in which the flow is computed
 LARGEST = 64  # most of the flow's norm that these bits are enough for

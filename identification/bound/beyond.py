@@ -11,7 +11,7 @@ from identification.base.arrays import Real as Numbers
 from identification.base.errors import InputError, shown
 from identification.bound.shape import OUTSIDE
 from identification.bound.tightest_bound import Band, resonances, within
-from identification.model.plant import AdditiveBound
+from identification.model.additive_bound import AdditiveBound
 from identification.model.reports import Outside
 
 FITTED = np.geomspace(1.0, OUTSIDE, 21)[1:]  # times the edges: where |W_a| is limited from the first round on

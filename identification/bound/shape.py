@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from identification.base.arrays import Complex, Real
-from identification.model.plant import AdditiveBound, Mode
+from identification.model.additive_bound import AdditiveBound
+from identification.model.modes import Mode
 
 OUTSIDE = 10.0  # poles and zeros lie up to this factor outside the band
 NEARBY = 3.0  # and none of them far outside without need

@@ -12,7 +12,8 @@ from scipy.optimize import Bounds, minimize
 from identification.base.arrays import Flags, Real, Whole
 from identification.bound.least_excess import least_largest_excess
 from identification.bound.shape import NEARBY, OUTSIDE, Shape
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.plant import PlantModel
 
 ALLOWANCE = 0.05  # share of the least largest excess that is given away for a smaller mean
 BINS = 200  # equal in log frequency, each with one point to begin with and one more a round where it is needed

@@ -11,7 +11,8 @@ from identification.base.errors import InputError
 from identification.fitting.grouped_lines import grouped
 from identification.fitting.likelihood import Likely
 from identification.fitting.nominal_plant import Nominal, nominal_of
-from identification.fitting.single_test_fit import OneFit, ScaledTest, Undetermined
+from identification.fitting.one_fit import OneFit
+from identification.fitting.single_test_fit import ScaledTest, Undetermined
 from identification.fitting.structure_selection import ALIKE, Selection
 from identification.model.plant import PlantModel
 from identification.model.structure import Structure, Wanted

@@ -11,7 +11,8 @@ from scipy.special import chdtrc, stdtrit
 from identification.base.arrays import Real
 from identification.base.errors import InputError
 from identification.fitting.likelihood import maximise_together
-from identification.fitting.single_test_fit import FINE, OneFit, ScaledTest
+from identification.fitting.one_fit import OneFit
+from identification.fitting.single_test_fit import FINE, ScaledTest
 from identification.model.plant import PlantModel
 from identification.model.structure import Structure
 

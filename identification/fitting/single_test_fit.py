@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from identification.fitting.first_guess import guesses
 from identification.fitting.least_squares import information, response_of
 from identification.fitting.likelihood import Likely, Lines, maximise
 from identification.fitting.neighbouring_structures import grown
-from identification.model.plant import PlantModel
+from identification.fitting.one_fit import OneFit
 from identification.model.structure import Structure
 from identification.sweeps.response import FrequencyResponse
 
@@ -37,68 +37,6 @@ class Undetermined(InputError):
 
 class Misfit(InputError):
     """A model is nowhere near the data."""
-
-
-@dataclass(frozen=True)
-class OneFit:
-    """The plant of one test.
-
-    Parameters
-    ----------
-    name
-        The test's.
-    structure
-        Of the plant.
-    theta
-        (p,) parameters of the structure in physical units, modes sorted by omega.
-    sign
-        Of the gain.
-    covariance
-        (p, p) of theta, from residuals that are noise.
-    deviance
-        -2 log likelihood, of the response in units of its own.
-    spread
-        Factor between the covariance and the inverse curvature of the squared residuals, see :meth:`ScaledTest.finish`.
-    misfit
-        What the covariance of theta is to be multiplied by and added on account of residuals that are no noise but what
-        the model leaves; 0 when neighbouring residuals correlate no more than by chance.
-    floor, relative
-        a and b of the noise E|error|^2 = a^2 + b^2 |P|^2, estimated; a in the response's unit. For soft-L1 errors
-        the same of their scale.
-    chi_square
-        Squared residuals over their variance, per degree of freedom; near 1 because a and b are estimated.
-    correlation
-        Of neighbouring normalised residuals; 0 within 1/sqrt(lines) when they are noise.
-    distance
-        Median of |test - plant|/|test|.
-    lines
-        M, the number of frequencies.
-    """
-
-    name: str
-    structure: Structure
-    theta: Real
-    sign: float
-    covariance: Real
-    deviance: float
-    spread: float
-    misfit: float
-    floor: float
-    relative: float
-    chi_square: float
-    correlation: float
-    distance: float
-    lines: int
-
-    @property
-    def errors(self) -> Real:
-        """(p,) standard errors of theta from the residuals of this test, noise and misfit."""
-        return np.sqrt(np.diag(self.covariance) * (1 + self.misfit))
-
-    @property
-    def plant(self) -> PlantModel:
-        """The test's own model."""
-        return self.structure.plant(self.theta, self.sign)
 
 
 class ScaledTest:

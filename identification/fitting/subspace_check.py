@@ -14,7 +14,8 @@ from scipy.linalg import eigvals
 from scipy.signal import resample_poly
 
 from identification.base.arrays import Complex, Real
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.pulse_response import pulse_zeros
 from identification.model.reports import ModeCheck, SubspaceCheck
 

@@ -18,7 +18,8 @@ from identification.base.json_object import (
     truth,
     words,
 )
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.plant import PlantModel
 from identification.model.plant_json import from_shape, plant_from_dict, plant_to_dict, shaped
 from identification.model.reports import BoundReport, SubspaceCheck
 
@@ -87,6 +88,8 @@ class FittedTest:
         Its lowest and highest line, in rad/s.
     left_out
         Lines that were not used, in sentences.
+    remarks
+        What was left out or changed while the test was read.
     """
 
     name: str
@@ -101,6 +104,7 @@ class FittedTest:
     synthetic: bool
     band: tuple[float, float]
     left_out: tuple[str, ...]
+    remarks: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """An entry of ``tests``."""
@@ -110,6 +114,7 @@ class FittedTest:
             "noise": asdict(self.noise),
             "band": list(self.band),
             "left_out": list(self.left_out),
+            "remarks": list(self.remarks),
         }
 
     @classmethod

@@ -11,8 +11,9 @@ from typing import Any
 
 from identification.base.errors import InputError
 from identification.base.json_object import member, read_json
+from identification.model.additive_bound import AdditiveBound
 from identification.model.fit_record import FitRecord, Numbers
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.plant import PlantModel
 from identification.model.plant_json import (
     bound_from_dict,
     bound_to_dict,

@@ -8,7 +8,9 @@ from typing import Any
 
 from identification.base.errors import InputError, shown
 from identification.base.json_object import number, numbers
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 
 def shaped(plant: PlantModel, values: Iterable[float]) -> dict[str, Any]:

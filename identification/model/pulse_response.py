@@ -10,7 +10,8 @@ from scipy.linalg import eigvals, expm
 
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 SMALL = 1.0  # 1-norm up to which a matrix is exponentiated without squaring
 WHOLE = 1e-9  # a delay this close to a whole number of intervals is whole: instants in files carry rounding

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from identification.base.json_object import Reader, member, objects, or_none, record
-from identification.model.plant import AdditiveBound
+from identification.model.additive_bound import AdditiveBound
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from identification.base.arrays import Flags, Real, Whole
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 MOST_REAL = 3
 """Real zeros, and real poles, that can be asked for."""

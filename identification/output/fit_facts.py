@@ -10,9 +10,10 @@ from identification.base.arrays import Real
 from identification.base.digits import lower_end
 from identification.base.files import is_file, read_bytes
 from identification.fitting.fit_plant import FitResult
-from identification.fitting.single_test_fit import OneFit
+from identification.fitting.one_fit import OneFit
+from identification.model.additive_bound import AdditiveBound
 from identification.model.fit_record import Criterion, FitRecord, FittedTest, Noise, Numbers
-from identification.model.plant import AdditiveBound, Mode
+from identification.model.modes import Mode
 from identification.model.reports import BoundReport, SubspaceCheck
 from identification.model.structure import in_physical_units
 from identification.output.cautions import cautions
@@ -82,6 +83,7 @@ def _test_record(test: FrequencyResponse, fit: OneFit) -> FittedTest:
         synthetic=test.synthetic,
         band=(float(test.omega[0]), float(test.omega[-1])),
         left_out=tuple(map(str, test.left_out)),
+        remarks=test.remarks,
     )
 
 
@@ -178,11 +180,8 @@ def digits_of(value: float, width: float) -> int:
     return min(max(2 + floor(log10(value)) - floor(log10(width / 2)), 3), 10)
 
 
-def table(result: FitResult, said: Sequence[str]) -> str:
-    """Estimate, 95 % interval, and standard errors by noise and by scatter, a line for each parameter; remarks.
-
-    ``said`` are the cautions.
-    """
+def table(result: FitResult) -> str:
+    """Estimate, 95 % interval, and standard errors by noise and by scatter, a line for each parameter; remarks."""
     rows = [("parameter", "estimate", "95 % interval", "noise", "scatter")]
     for label, value, lower, upper, noise, scatter in parameter_rows(result):
         digits = max(5, digits_of(max(abs(value), abs(lower), abs(upper)), upper - lower))
@@ -193,4 +192,4 @@ def table(result: FitResult, said: Sequence[str]) -> str:
     shown = 5 if len(result.tests) > 1 else 4
     widths = [max(least, *(2 + len(row[k]) for row in rows)) for k, least in enumerate(WIDTHS[:shown])]
     lines = [row[0].ljust(widths[0]) + "".join(map(str.rjust, row[1:shown], widths[1:])) for row in rows]
-    return "\n".join([*lines, *remarks(result), *said])
+    return "\n".join([*lines, *remarks(result)])

@@ -12,8 +12,9 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, MultipleLo
 
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.plant import PlantModel
 from identification.sweeps.response import FrequencyResponse, alias_free
 from paper_figures.look.style import styled
 

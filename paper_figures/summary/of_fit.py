@@ -10,9 +10,10 @@ from math import hypot
 from identification.base.digits import lower_end
 from identification.base.errors import InputError, printable
 from identification.fitting.nominal_plant import ONE_PLANT
+from identification.model.additive_bound import AdditiveBound
 from identification.model.fit_record import FitRecord
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, PlantModel
+from identification.model.plant import PlantModel
 from identification.model.reports import BoundReport, SubspaceCheck
 from identification.output.fit_facts import bound_text, digits_of
 from identification.sweeps.response import FrequencyResponse

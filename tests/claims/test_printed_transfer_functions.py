@@ -14,7 +14,8 @@ from design.chapter_2.internal_model import internal_model
 from design.chapters_3_4.smith_predictor import anti_windup_controller, augmented_plant
 from design.design_file import Design
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 GRID = 1j * np.union1d(np.geomspace(0.05, 5000, 500), [175.0, 280.0, 282.0, 930.0, 960.0])
 SLOW = 1j * np.geomspace(0.05, 30, 200)

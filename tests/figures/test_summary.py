@@ -20,9 +20,11 @@ from design.design_file import Design
 from design.hinf.mixed_sensitivity import Synthesis
 from design.parameters import DelayFreeParameters, ExtendedParameters, RollOff
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.fit_record import Criterion, FitRecord, FittedTest, Noise
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.reports import BoundReport, Excess, ModeCheck, SubspaceCheck, Touch
 from identification.model.structure import Structure
 from identification.sweeps.response import FrequencyResponse
@@ -76,6 +78,7 @@ def record_of(plant: PlantModel, tests: list[FrequencyResponse], bound: Additive
         structure=str(structure),
         method="maximum likelihood",
         loss="least squares",
+        conjugated=False,
         criterion=Criterion("BIC", 1.0, {str(structure): 5.0, "1 integrator": 99.0}),
         lower=share(0.98),
         upper=share(1.02),
@@ -83,6 +86,8 @@ def record_of(plant: PlantModel, tests: list[FrequencyResponse], bound: Additive
         misfit=share(0.0),
         scatter=share(0.01) if len(tests) > 1 else None,
         agreement_of_tests=1e-9 if len(tests) > 1 else None,
+        median_distances=(0.012,) * len(tests),
+        cautions=("no dead time can be told from none",) if plant.delay_s == 0 else (),
         tests=tuple(
             FittedTest(
                 name=test.name,
@@ -95,6 +100,9 @@ def record_of(plant: PlantModel, tests: list[FrequencyResponse], bound: Additive
                 median_distance=0.012,
                 sha256=None,
                 synthetic=test.synthetic,
+                band=(float(test.omega[0]), float(test.omega[-1])),
+                left_out=(),
+                remarks=(),
             )
             for test in tests
         ),

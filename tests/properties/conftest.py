@@ -6,8 +6,10 @@ import pytest
 from other_units import small_delay_free, small_extended
 
 from design.design_file import Design
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 
 @pytest.fixture(scope="session")

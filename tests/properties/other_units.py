@@ -14,8 +14,10 @@ from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
 from design.parameters import DelayFreeParameters, ExtendedParameters
 from experiments.runs.references import Reference, SampledReference
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from identification.fitting.fit_plant import fit_plant
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.structure import Structure
 from identification.sweeps.response import FrequencyResponse
 

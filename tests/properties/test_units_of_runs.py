@@ -28,7 +28,8 @@ from experiments.runs.design_loop import design_loop
 from experiments.runs.guarantee import guarantee, sector_text
 from experiments.runs.references import Reference, SampledReference
 from experiments.runs.sector_promise import Verdict, judge_run
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 SIGNS = st.sampled_from([-1.0, 1.0])
 POWERS = st.builds(

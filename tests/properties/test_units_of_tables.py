@@ -30,8 +30,10 @@ from experiments.thesis.studies.sampled_rates import sampled_rates_tables
 from experiments.thesis.studies.trade_off import trade_off_tables
 from identification.bound.bound_residuals import bound_residuals
 from identification.fitting.fit_plant import fit_plant
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.structure import Wanted
 from identification.output.fit_facts import table as fit_table
 from identification.sweeps.read_sweeps import read_sweeps

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm
 from scipy.signal import tf2ss
 
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.pulse_response import hold, pulse_response
 
 Real = NDArray[np.float64]

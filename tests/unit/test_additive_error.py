@@ -11,8 +11,10 @@ from click.testing import CliRunner
 
 from experiments.__main__ import main
 from experiments.thesis.studies.additive_error import additive_error_tables
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.pulse_response import aliases
 from identification.sweeps.response import FrequencyResponse, Record
 

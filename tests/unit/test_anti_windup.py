@@ -14,8 +14,10 @@ from design.anti_windup.popov import popov_sector, robust_popov_sector
 from design.anti_windup.thesis_compensator import least_f, optimal_gamma, thesis_choice
 from design.blocks.block import Block, bound_block, plant_block
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 S = 1j * np.geomspace(1e-2, 1e4, 300) + 0.05
 positive = st.floats(1e-3, 1e3)

@@ -21,7 +21,8 @@ from experiments.runs.design_loop import design_loop
 from experiments.runs.references import sinusoid
 from experiments.thesis.printed_choices import thesis_reference
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 S = 1j * np.geomspace(1e-2, 1e3, 100) + 0.03
 rates = st.floats(0.1, 50.0)

@@ -14,8 +14,10 @@ from experiments.thesis.studies import trade_off
 from experiments.thesis.studies.interpolation import SENSITIVITY, interpolation_tables
 from experiments.thesis.studies.robustness import robustness_tables
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 OTHER = PlantModel(-0.4, (Mode(20.0, 0.03),), (Mode(32.0, 0.02),), 0.06)
 

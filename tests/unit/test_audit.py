@@ -18,8 +18,10 @@ from design.chapter_2.design_delay_free import design_delay_free
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design, read_design
 from design.hinf.mixed_sensitivity import Synthesis
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 
 @pytest.fixture

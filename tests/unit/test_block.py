@@ -20,7 +20,7 @@ from design.blocks.block import (
 from design.blocks.state_space import StateSpace, realize
 from identification.base.errors import InputError
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import Mode
+from identification.model.modes import Mode
 
 S = 1j * np.geomspace(1e-2, 1e4, 400) + 0.1
 

@@ -11,7 +11,8 @@ from identification.bound.least_excess import least_largest_excess
 from identification.bound.level_certificate import excludes
 from identification.bound.shape import Shape
 from identification.bound.tightest_bound import resonances
-from identification.model.plant import AdditiveBound, Mode
+from identification.model.additive_bound import AdditiveBound
+from identification.model.modes import Mode
 
 Real = NDArray[np.float64]
 

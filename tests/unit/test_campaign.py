@@ -34,7 +34,8 @@ from experiments.runs.guarantee import guarantee_within
 from experiments.thesis.printed_choices import thesis_reference
 from identification.base.errors import InputError
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 ROOT = Path(__file__).resolve().parents[2]
 PLANTS, LIMIT = 24, 12.0

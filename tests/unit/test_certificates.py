@@ -18,7 +18,8 @@ from experiments.physical_limits.response_cells import UNIT, Cells
 from experiments.runs.references import Reference, sinusoid
 from experiments.runs.steady_control import PI
 from identification.base.errors import InputError
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 DIGITS = 40
 CELLS = 90

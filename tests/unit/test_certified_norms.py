@@ -15,7 +15,7 @@ from design.blocks.block import Block
 from design.blocks.frequency_peak import CERTIFIED, block_norm, frequency_grid, peak
 from design.blocks.positivity import combined, multiplied, not_positive_at, squared_magnitude
 from identification.base.errors import InputError
-from identification.model.plant import Mode
+from identification.model.modes import Mode
 
 decades = st.floats(-2.0, 3.0)
 units = st.floats(-9.0, 9.0)

@@ -25,8 +25,10 @@ from design.choices import METHODS
 from design.design_file import Design, read_design
 from design.stability.coprime import controller, coprime_factors
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 S = 1j * np.geomspace(1e-2, 3e3, 300) + 0.01
 

@@ -14,7 +14,8 @@ from scipy.integrate import quad_vec
 from scipy.signal import cont2discrete
 
 from identification.base.errors import InputError
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.pulse_response import aliases, hold, pulse_response, pulse_zeros
 
 Complex = NDArray[np.complex128]

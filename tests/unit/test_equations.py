@@ -37,8 +37,10 @@ from experiments.runs.references import Reference, sinusoid
 from experiments.thesis.claims.checks.transfer_functions import bound_4_9, plant_4_8
 from experiments.thesis.claims.inputs import rounded_inputs
 from experiments.thesis.claims.ledger import read_ledger
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 Complex = NDArray[np.complex128]
 

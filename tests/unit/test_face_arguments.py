@@ -41,8 +41,8 @@ def test_counts_as_they_come(modes: int) -> None:
         ({"modes": "2"}, "modes is '2'"),
         ({"modes": (2, 2, 2)}, "modes is"),
         ({"modes": 50}, "modes is 50"),
-        ({"real": 2}, "real is 2; expected a number from 0 to 1"),
-        ({"integrators": 3}, "integrators is 3; expected 0, 1 or 2"),
+        ({"real": 4}, "real is 4; expected a number from 0 to 3"),
+        ({"integrators": 3}, "integrators is 3; expected an integer from -2 to 2"),
     ],
 )
 def test_counts_that_are_none(options: dict[str, int], part: str) -> None:

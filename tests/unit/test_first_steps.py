@@ -23,8 +23,10 @@ from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference, SampledReference, sinusoid
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 FREE = (-np.inf, np.inf)
 

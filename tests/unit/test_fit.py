@@ -15,7 +15,8 @@ from identification.fitting.dead_time import group_delay
 from identification.fitting.fit_plant import FitResult, fit_plant
 from identification.fitting.least_squares import log_jacobian, response_of
 from identification.fitting.likelihood import noise_levels
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.structure import Structure, Wanted
 from identification.sweeps.read_sweeps import read_sweeps
 from identification.sweeps.response import FrequencyResponse

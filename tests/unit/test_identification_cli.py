@@ -12,7 +12,8 @@ from click.testing import CliRunner, Result
 
 from identification.__main__ import main
 from identification.model.model_file import read_model
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.plant_json import shaped
 from paper_figures.__main__ import main as paper_figures_main
 

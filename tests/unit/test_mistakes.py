@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from data.thesis import THESIS
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.sweeps.read_sweeps import read_sweeps
 from identification.sweeps.swapped_or_wrong_unit import bends, lead_time, wrap
 

@@ -16,8 +16,10 @@ from design.stability.characteristic_roots import roots_right_of
 from design.stability.delay_loop import DelayLoop
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import simulate
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 
 def loop_with_delay(design: Design, delay_s: float) -> DelayLoop:

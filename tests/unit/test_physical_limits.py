@@ -25,7 +25,8 @@ from experiments.runs.references import Reference, sinusoid
 from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies.conditions import several_limits
 from identification.base.errors import InputError
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 CHAPTER_2 = sinusoid(50.0, math.pi / 2, math.pi / 2, -50.0)
 CHAPTER_4 = sinusoid(50.0, 1.5, math.pi / 2, 0.0)

@@ -16,7 +16,9 @@ from design.chapter_2.design_delay_free import stabiliser_problem
 from design.hinf.closed_loop_norm import closed_loop_norm, closed_loop_poles
 from design.hinf.mixed_sensitivity import Synthesis, mixed_sensitivity
 from identification.base.digits import lower_end, upper_end
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 Case = tuple[PlantModel, AdditiveBound, float, float]  # plant, bound, period, epsilon
 

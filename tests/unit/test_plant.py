@@ -10,8 +10,10 @@ import pytest
 
 from design.blocks.block import bound_block, plant_block
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel, read_model
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.plant_json import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
 
 S = 1j * np.geomspace(0.1, 100, 50)
@@ -54,7 +56,7 @@ def test_json_there_and_back() -> None:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"integrators": 3}, "integrators is 3; expected 0, 1 or 2"),
+        ({"integrators": 3}, "integrators is 3; expected an integer from -2 to 2"),
         ({"integrators": True}, "integrators is True"),
         ({"real_zeros": 3.0}, "'real_zeros' is 3.0; expected a list of numbers"),
         ({"real_poles": [-1.0]}, "real_poles is -1; expected a positive number"),

@@ -14,7 +14,9 @@ from experiments.engine.simulate import simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import sinusoid
 from identification.base.errors import InputError
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.additive_bound import AdditiveBound
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.sweeps.response import FrequencyResponse
 
 PLANT = PlantModel(-3.0, (Mode(20.0, 0.1),), (Mode(30.0, 0.02), Mode(50.0, 1.5)), 0.02, 2, (7.0,), (40.0, 90.0))

@@ -14,8 +14,10 @@ from design.blocks.block import bound_block
 from design.blocks.frequency_peak import block_norm
 from design.chapters_3_4.design_extended import design_extended
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 shares = st.floats(0.0, 2.0)
 bounds = st.builds(

@@ -18,8 +18,10 @@ from design.stability.characteristic_roots import rightmost_roots, roots_right_o
 from design.stability.delay_loop import DelayLoop
 from design.stability.margins import Margins, delay_loop, margins_of, tracking_floor
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 ONE, NONE = Block(1.0), Block(0.0)
 BOUND = AdditiveBound.printed_form(0.01, 20.0, 280.0, 0.05)

@@ -26,8 +26,10 @@ from experiments.runs.references import Reference, SampledReference, sinusoid
 from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies.sampled_rates import sampled_rates_tables
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.pulse_response import pulse_response
 
 FREE = (-math.inf, math.inf)

@@ -12,7 +12,8 @@ from design.blocks.state_space import realize
 from design.design_file import Design
 from experiments.drive.difference_equations import SampledBlock, sample_block, split
 from identification.base.errors import InputError
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.pulse_response import pulse_response
 
 T = 2e-3

@@ -13,8 +13,10 @@ from experiments.engine.simulate import DivergenceError, simulate
 from experiments.runs.design_loop import design_loop
 from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies import sampled_rates
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 LIMIT = 80.0
 

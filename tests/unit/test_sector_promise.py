@@ -28,8 +28,10 @@ from experiments.runs.sector_promise import Verdict, judge_run, needed_sector, s
 from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies.chapter_2 import delay_free_tables
 from experiments.thesis.studies.chapter_4 import extended_tables
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 CHAPTER_4 = sinusoid(50.0, 1.5, np.pi / 2, 0.0)
 AMPLITUDE = 50 * 1.5 / 7.105  # of the control that follows it, but for the modes

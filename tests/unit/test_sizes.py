@@ -25,7 +25,8 @@ from identification.formats import mat_level_5, sizes
 from identification.formats.csv_file import read_csv
 from identification.formats.mat_file import read_mat
 from identification.formats.reading import Reading
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.structure import Structure
 from identification.sweeps import estimate_response as module
 from identification.sweeps import from_table as reader
@@ -84,7 +85,7 @@ def test_blocks_of_lines_are_added() -> None:
     response = value * (1 + 0.1 * np.sin(omega))
     rows = value[:, None] * log_jacobian(structure, theta, omega) / sigma[:, None]
     residual = (value - response) / sigma
-    cost, slope, curvature = _normal_at(theta, (1, 1, 1, 0, 0), omega, response, sigma, False)
+    cost, slope, curvature = _normal_at(theta, structure.counts, omega, response, sigma, False)
     assert cost == pytest.approx(np.sum(np.abs(residual) ** 2))
     np.testing.assert_allclose(slope, (rows.conj().T @ residual).real, rtol=1e-9, atol=1e-9 * cost)
     for found in (curvature, information(structure, theta, omega, sigma)):

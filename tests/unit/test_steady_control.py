@@ -12,7 +12,8 @@ from experiments.physical_limits.intervals import Interval
 from experiments.physical_limits.least_peak_error import periodic_limit
 from experiments.runs.references import Reference, sinusoid
 from experiments.runs.steady_control import Wave, peak
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 PLANT = PlantModel(3.0, (Mode(30.0, 0.05),), (Mode(45.0, 0.02),), 0.03)
 

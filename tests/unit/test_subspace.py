@@ -13,7 +13,8 @@ from scipy.signal import fftconvolve
 
 from data.thesis import model_named
 from identification.fitting.subspace_check import check_modes
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.reports import SubspaceCheck
 from identification.sweeps.read_sweeps import read_sweeps
 from identification.sweeps.response import Record

@@ -8,7 +8,8 @@ from held_plant import PLANTS, held_response, over_hold
 from numpy.typing import NDArray
 
 from identification.base.errors import InputError
-from identification.model.plant import Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 from identification.model.pulse_response import aliases
 from identification.sweeps.estimate_response import SweepEstimate, estimate_response
 from identification.sweeps.excited_lines import whole_periods

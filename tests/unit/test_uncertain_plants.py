@@ -11,8 +11,10 @@ from design.auditing.audit_design import covered_delay
 from experiments.campaign.distance_certificate import stays_below
 from experiments.campaign.draw_plants import ABOVE, PlantsWithin, as_factors
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import AdditiveBound, Mode, PlantModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
 
 
 def modes(count: int, first: float, ratio: float) -> tuple[Mode, ...]:

@@ -8,7 +8,7 @@ from scipy.optimize import minimize_scalar
 
 from design.anti_windup.compensator import second_order, uncertainty_cost
 from design.anti_windup.thesis_compensator import beta_grid, optimal_gamma, thesis_choice
-from identification.model.plant import AdditiveBound
+from identification.model.additive_bound import AdditiveBound
 
 
 def f_gamma_tables(bound: AdditiveBound) -> dict[str, pd.DataFrame]:
