@@ -31,8 +31,8 @@ def usable_lines(
     Returns
     -------
     tuple
-        (C, 3) the lines to keep, and those to leave out by the reason. Lines beyond both ends of the band that the input
-        excites are neither.
+        (C, 3) the lines to keep, and those to leave out by the reason. Lines beyond the band that the input excites
+        are neither.
 
     Notes
     -----
