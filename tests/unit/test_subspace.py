@@ -162,3 +162,20 @@ def test_records_of_any_length(samples: int) -> None:
 def test_a_plant_without_modes_is_answered_too() -> None:
     plant = replace(PLANTS["no integrator, real pole"], pole_modes=(), integrators=2)
     assert str(check_modes(plant, _record(plant), BAND)).endswith("the plant has no mode in the band to check")
+
+
+def test_zeros_in_the_right_half_plane() -> None:
+    plant = replace(PLANTS["integrator"], zero_modes=(Mode(300.0, -0.1),))
+    omega, zeta = _errors(plant, check_modes(plant, _record(plant), BAND))
+    assert max(omega) < 1e-3
+    assert max(zeta) < 5e-2
+
+
+def test_a_zero_at_the_origin_is_not_differenced() -> None:
+    """A tachometer in place of the encoder."""
+    position = PLANTS["no integrator, real pole"]
+    record = _record(position)
+    moving = replace(record, output=np.gradient(record.output, T))
+    check = check_modes(replace(position, integrators=-1), moving, BAND)
+    assert check.reason is None
+    assert [round(mode.found_omega or 0.0) for mode in check.modes] == [200]
