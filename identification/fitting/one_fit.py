@@ -30,7 +30,8 @@ class OneFit:
     deviance
         -2 log likelihood, of the response in units of its own.
     spread
-        Factor between the covariance and the inverse curvature of the squared residuals, see :meth:`identification.fitting.single_test_fit.ScaledTest.finish`.
+        Factor between the covariance and the inverse curvature of the squared residuals, see
+        :meth:`identification.fitting.single_test_fit.ScaledTest.finish`.
     misfit
         What the covariance of theta is to be multiplied by and added on account of residuals that are no noise but what
         the model leaves; 0 when neighbouring residuals correlate no more than by chance.
