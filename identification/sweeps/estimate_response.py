@@ -114,11 +114,11 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
             "(a longer record or a wider sweep)"
         )
     step = float(omega[1] - omega[0])
-    tau = _group_delay(big_y[band] * big_u[band].conj(), step)
+    tau = _group_delay(*(np.fft.rfft(np.diff(x, 2), u.size - 1)[periods * (band + 1)] for x in (u, y)), step)
 
     def bend(at: Real) -> Complex:
-        """What H is when (1 - 1/z) H exp(j omega tau) is 1."""
-        return np.asarray(np.exp(-1j * at * tau) / -np.expm1(-1j * at * dt))
+        """What H is when (1 - 1/z)^2 H exp(j omega tau) is 1."""
+        return np.asarray(np.exp(-1j * at * tau) / np.expm1(-1j * at * dt) ** 2)
 
     bent = big_u * bend(omega)
     tiles = _tiles(band)
@@ -266,6 +266,7 @@ def _tiles(band: Whole) -> list[Whole]:
     return tiles
 
 
-def _group_delay(cross: Complex, step: float) -> float:
-    """Median group delay in seconds of a cross-spectrum (L,) on lines ``step`` rad/s apart, not negative."""
+def _group_delay(u: Complex, y: Complex, step: float) -> float:
+    """Median group delay in seconds from spectrum ``u`` (L,) to ``y`` on lines ``step`` rad/s apart, not negative."""
+    cross = y * u.conj()
     return max(0.0, -float(np.median(np.angle(cross[1:] * cross[:-1].conj()))) / step)
