@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from identification.base.arrays import Complex, Flags, Real, Whole
 from identification.base.errors import InputError
 from identification.model.pulse_response import hold
+from identification.sweeps.drift import find_drift
 from identification.sweeps.excited_lines import excited_band, whole_periods
 from identification.sweeps.local_models import (
     COEFFICIENTS,
+    RESOLVED,
+    SIGNIFICANT,
     TOGETHER,
     LocalFit,
     Windows,
     fit_windows,
-    pooled,
-    unexplained,
+    mistaken,
+    windows_of,
 )
 from identification.sweeps.response import LeftOut
 from identification.sweeps.usable_lines import usable_lines
 
 SHORTEST_WINDOW = COEFFICIENTS + 3  # three degrees of freedom left for the variance
+LONG_WINDOW = 5 * SHORTEST_WINDOW  # in which a drift is told from the response
 WINDOWS = 600  # aimed at; a longer record makes longer windows
 HELD = 300_000  # lines that are fitted at a time
 RELATIVE_WIDTH = 1 / 64  # of a window, at most, of its frequency where the shortest window allows it
@@ -33,7 +37,6 @@ EVIDENT = 4.0  # the same, where a transient would cost most of what the windows
 MATERIAL = 1e-9  # of the output's power
 FEWEST = 9  # lines of a response: three windows
 END, STILL = 200, 0.01  # of the samples, at each end, and motion there over that of the record: it rests
-DRIFTS = 30.0  # of a line's noise: what a drift explains in all windows; one that is not there moves the lowest lines
 APART = 2.0  # variances with and without transient, where the two can be told apart
 
 
@@ -116,20 +119,29 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
     step = float(omega[1] - omega[0])
     tau = _group_delay(*(np.fft.rfft(np.diff(x, 2), u.size - 1)[periods * (band + 1)] for x in (u, y)), step)
 
-    def bend(at: Real) -> Complex:
-        """What H is when (1 - 1/z)^2 H exp(j omega tau) is 1."""
-        return np.asarray(np.exp(-1j * at * tau) / np.expm1(-1j * at * dt) ** 2)
+    def bend(at: Real, poles: int) -> Complex:
+        """What H is when (1 - 1/z)^poles H exp(j omega tau) is 1."""
+        return np.asarray(np.exp(-1j * at * tau) / (-np.expm1(-1j * at * dt)) ** poles)
 
-    bent = big_u * bend(omega)
-    tiles = _tiles(band)
-    groups = [Windows(bent[tile], big_y[tile], *_places(tile.shape[1])) for tile in tiles]
+    tiles = _tiles(band, SHORTEST_WINDOW)
+    looks = tiles, _tiles(band, LONG_WINDOW)
+    once, twice = (find_drift(difference, big_u * bend(omega, poles), big_y, looks) for poles in (1, 2))
+    drift, poles = (twice, 2) if once.misfit - twice.misfit > SIGNIFICANT else (once, 1)
+    groups = windows_of(tiles, big_u * bend(omega, poles), big_y - drift.columns @ drift.size)
     at_nodes: Real = np.concatenate(
         [_frequencies(omega[tile], group.nodes) for tile, group in zip(tiles, groups, strict=True)]
     )
-    fit, alone = _without_drift(groups, [difference[tile] for tile in tiles], y, noisy_input=not held)
-    factor = bend(at_nodes) / (hold(at_nodes, dt) if held else 1.0)
-    gain, response = fit.gain * np.abs(factor) ** 2, fit.response * factor
-    usable, left_out = usable_lines(at_nodes, response, gain, alone * np.abs(factor) ** 2, fit.noise)
+    truncated, rest = fit_windows(groups, transient=True), fit_windows(groups, transient=False)
+    blind = not held or _still(y, float(np.median(truncated.noise)))
+    cut = _needs_transient(truncated, rest, groups, blind=blind)
+    fit = truncated.where(cut, rest)
+    doubt = _doubt(groups, [drift.columns[tile] for tile in tiles], drift.covariance, cut)
+    power = np.concatenate([np.mean(np.abs(group.output) ** 2, axis=1) for group in groups])
+    tiny = np.finfo(float).tiny
+    factor = bend(at_nodes, poles) / (hold(at_nodes, dt) if held else 1.0)
+    gain = (fit.gain + doubt / (fit.noise + RESOLVED * power + tiny)[:, None]) * np.abs(factor) ** 2
+    response = fit.response * factor
+    usable, left_out = usable_lines(at_nodes, response, gain, rest.gain * np.abs(factor) ** 2, fit.noise)
     if usable.sum() < FEWEST:
         why = "; ".join(map(str, left_out))
         raise InputError(f"{usable.sum()} spectral lines tell of the plant; expected {FEWEST} or more ({why})")
@@ -142,39 +154,13 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
     )
 
 
-def _without_drift(
-    groups: Sequence[Windows], differences: Sequence[Complex], y: Real, *, noisy_input: bool
-) -> tuple[LocalFit, Real]:
-    """The windows' fit after taking out a drift of the output that no local model sees, if there is one.
-
-    The second is the gain (C, 3) without transient, which is the excitation's alone.
-
-    An output whose slope differs at the record's two ends, as a double integrator's does, adds b/(1 - 1/z)^2 to its
-    spectrum, and one that ends elsewhere than it began a/(1 - 1/z), with real a and b. The differences leave no
-    more of the latter than the noise of two samples. Both follow from all windows together; they are
-    taken out if that explains significantly more, and spares windows the transient or leaves none that needs it.
-    """
-    truncated, rest = fit_windows(groups, transient=True), fit_windows(groups, transient=False)
-    blind = noisy_input or _still(y, float(np.median(truncated.noise)))
-    cut = _needs_transient(truncated, rest, groups, blind=blind)
-    chosen = truncated.where(cut, rest)
-    power = np.concatenate([np.mean(np.abs(group.output) ** 2, axis=1) for group in groups])
-    noise = np.maximum(pooled(chosen.noise), np.finfo(float).eps ** 2 * power) + np.finfo(float).tiny
-    usable = ~truncated.resonant
-    for _ in range(2):
-        if not usable.any():
-            return chosen, rest.gain
-        weights = np.split(usable / noise, np.cumsum([len(group.input) for group in groups])[:-1])
-        moved = _less_drift(groups, differences, weights, y.size / (4 * float(np.median(noise))))
-        rest_moved = fit_windows(moved, transient=False)
-        if np.sum((rest.left - rest_moved.left) / noise) < DRIFTS:
-            return chosen, rest.gain
-        usable = ~rest_moved.resonant
-    truncated = fit_windows(moved, transient=True)
-    cut_moved = _needs_transient(truncated, rest_moved, moved, blind=blind)
-    if cut_moved.sum() < cut.sum() or not cut_moved.any():
-        return truncated.where(cut_moved, rest_moved), rest_moved.gain
-    return chosen, rest.gain
+def _doubt(groups: Sequence[Windows], drifts: Sequence[Complex], covariance: Real, cut: Flags) -> Real:
+    """Variance (C, 3) of the response at the nodes that the drift's (k, k) makes; ``cut`` (C,) have a transient."""
+    parts = []
+    for transient in (False, True):
+        wrong = [mistaken(group, drift, transient=transient) for group, drift in zip(groups, drifts, strict=True)]
+        parts.append(np.concatenate([np.einsum("cni,ij,cnj->cn", w.conj(), covariance, w).real for w in wrong]))
+    return np.where(cut[:, None], parts[1], parts[0])
 
 
 def _still(y: Real, noise: float) -> bool:
@@ -183,22 +169,6 @@ def _still(y: Real, noise: float) -> bool:
     ends = max(1, moves.size // END)
     most = STILL**2 * np.mean(moves) + 2 * TRUNCATED * noise / y.size
     return bool(np.mean(moves[:ends]) < most and np.mean(moves[-ends:]) < most)
-
-
-def _less_drift(
-    groups: Sequence[Windows], differences: Sequence[Complex], weights: Sequence[Real], prior: float
-) -> list[Windows]:
-    """The windows with the likeliest a/(1 - 1/z) + b/(1 - 1/z)^2 taken off; ``prior`` is 1/(2 variance) of a."""
-    information, moment = np.diag([prior, 0.0]), np.zeros(2)
-    drifts = [difference[..., None] ** -np.arange(1, 3) for difference in differences]
-    for group, drift, weight in zip(groups, drifts, weights, strict=True):
-        left = unexplained(group, np.concatenate([drift, group.output[..., None]], axis=2))
-        products = np.einsum("cwi,cwj,c->ij", left.conj(), left, weight).real
-        information += products[:2, :2]
-        moment += products[:2, 2]
-    scale = 1 / np.sqrt(np.diag(information))
-    size = scale * np.linalg.lstsq(information * scale[:, None] * scale, moment * scale, rcond=None)[0]
-    return [replace(group, output=group.output - drift @ size) for group, drift in zip(groups, drifts, strict=True)]
 
 
 def _needs_transient(truncated: LocalFit, rest: LocalFit, groups: Sequence[Windows], *, blind: bool) -> Flags:
@@ -242,19 +212,12 @@ def _frequencies(omega: Real, nodes: Real) -> Real:
     return np.asarray(centre + half_width * nodes)
 
 
-def _places(width: int) -> tuple[Real, Real]:
-    """Places of a window's lines, -1 to 1, and of the zeros of the cubic orthogonal on them."""
-    half = width // 2
-    node = np.sqrt((3 * half * (half + 1) - 1) / 5) / half
-    return np.arange(-half, half + 1) / half, np.array([-node, 0.0, node])
-
-
-def _tiles(band: Whole) -> list[Whole]:
+def _tiles(band: Whole, shortest: int) -> list[Whole]:
     """The band's lines in windows of odd width, (C, W), HELD lines at most; narrower where frequencies are low."""
-    widest = max(SHORTEST_WINDOW, band.size // WINDOWS) // 2 * 2 + 1
+    widest = max(shortest, band.size // WINDOWS) // 2 * 2 + 1
     tiles, first = [], 0
     while first < band.size:
-        width = min(widest, max(SHORTEST_WINDOW, int(band[first] * RELATIVE_WIDTH)) // 2 * 2 + 1)
+        width = min(widest, max(shortest, int(band[first] * RELATIVE_WIDTH)) // 2 * 2 + 1)
         last = width == widest
         lines = band.size - first if last else min(band.size - first, max(width, int(band[first])))
         count = lines // width

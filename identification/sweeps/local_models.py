@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.base.arrays import Array, Complex, Flags, Real
+from identification.base.arrays import Array, Complex, Flags, Real, Whole
 
 ORDER = 2  # of the polynomials
 COEFFICIENTS = 2 * (ORDER + 1)  # of the response and of the transient
@@ -38,6 +38,16 @@ class Windows:
     output: Complex
     place: Real
     nodes: Real
+
+
+def windows_of(tiles: Sequence[Whole], u: Complex, y: Complex) -> list[Windows]:
+    """Windows of the lines ``tiles``, each (C, W) with an odd W, of the spectra (L,) of input and output."""
+    groups = []
+    for tile in tiles:
+        half = tile.shape[1] // 2
+        node = np.sqrt((3 * half * (half + 1) - 1) / 5) / half  # of the cubic orthogonal on the lines
+        groups.append(Windows(u[tile], y[tile], np.arange(-half, half + 1) / half, np.array([-node, 0.0, node])))
+    return groups
 
 
 @dataclass(frozen=True)
@@ -116,6 +126,13 @@ def unexplained(windows: Windows, spectra: Complex) -> Complex:
     """What of ``spectra`` (C, W, k) is no quadratic response to the input, (C, W, k)."""
     q, _ = np.linalg.qr(_columns(windows, 0))
     return np.asarray(spectra - q @ (np.swapaxes(q.conj(), 1, 2) @ spectra))
+
+
+def mistaken(windows: Windows, spectra: Complex, *, transient: bool) -> Complex:
+    """The response (C, 3, k) at the nodes that ``spectra`` (C, W, k) in the output are mistaken for."""
+    q, upper = np.linalg.qr(_columns(windows, ORDER + 1 if transient else 0))
+    found = np.linalg.pinv(upper, rcond=RANK)[:, : ORDER + 1] @ (np.swapaxes(q.conj(), 1, 2) @ spectra)
+    return np.asarray((windows.nodes[:, None] ** np.arange(ORDER + 1)) @ found / _level(windows.input)[..., None])
 
 
 def pooled(noise: Real) -> Real:
