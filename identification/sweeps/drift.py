@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from identification.base.arrays import Complex, Real, Whole
 from identification.sweeps.local_models import ORDER, unexplained, windows_of
 
 EVIDENT = 30.0  # of its variance: the square of a drift that is taken off; one that is not there moves the lowest lines
+ORDERS = ORDER, 2 * ORDER  # of the response in short and in long windows
 REWEIGHTED = 6  # times: the noise of a window is known when the drift is
 
 
@@ -35,8 +36,11 @@ class Drift:
     covariance: Real
     misfit: float
 
+    def none(self) -> Drift:
+        return replace(self, columns=self.columns[:, :0], size=self.size[:0], covariance=self.covariance[:0, :0])
 
-def find_drift(difference: Complex, u: Complex, y: Complex, looks: Sequence[Sequence[Whole]]) -> Drift:
+
+def find_drift(difference: Complex, u: Complex, y: Complex, looks: Sequence[Sequence[Whole]], samples: int) -> Drift:
     """Find a/(1 - 1/z) + b/(1 - 1/z)^2, with real a and b, in the output's spectrum.
 
     Parameters
@@ -47,6 +51,8 @@ def find_drift(difference: Complex, u: Complex, y: Complex, looks: Sequence[Sequ
         (L,) spectra of input and output.
     looks
         The lines in short windows and in long ones, each (C, W).
+    samples
+        Of the record.
 
     Notes
     -----
@@ -64,7 +70,9 @@ def find_drift(difference: Complex, u: Complex, y: Complex, looks: Sequence[Sequ
     """
     for kinds in (2, 1, 0):
         columns = difference[:, None] ** -np.arange(1.0, kinds + 1)
-        short, long = (_likeliest(columns, u, y, tiles) for tiles in looks)
+        short, long = (
+            _likeliest(columns, u, y, tiles, order, samples) for tiles, order in zip(looks, ORDERS, strict=True)
+        )
         apart = long.size - short.size
         agree = kinds > 0 and apart @ np.linalg.solve(short.covariance, apart) < EVIDENT
         drift = Drift(columns, long.size, long.covariance, short.misfit) if agree else short
@@ -73,22 +81,28 @@ def find_drift(difference: Complex, u: Complex, y: Complex, looks: Sequence[Sequ
     raise AssertionError
 
 
-def _likeliest(columns: Complex, u: Complex, y: Complex, tiles: Sequence[Whole]) -> Drift:
+def _likeliest(columns: Complex, u: Complex, y: Complex, tiles: Sequence[Whole], order: int, samples: int) -> Drift:
     """The likeliest size of the drifts if the noise of each window is what a quadratic response and they leave."""
     kinds = columns.shape[1]
     spectra = np.concatenate([columns, y[:, None]], axis=1)
-    left = [unexplained(group, spectra[tile]) for group, tile in zip(windows_of(tiles, u, y), tiles, strict=True)]
+    left = [
+        unexplained(group, spectra[tile], order) for group, tile in zip(windows_of(tiles, u, y), tiles, strict=True)
+    ]
     rounding = [np.finfo(float).eps ** 2 * np.sum(np.abs(y[tile]) ** 2, axis=1) for tile in tiles]
     size, covariance = np.zeros(kinds), np.zeros((kinds, kinds))
     for _ in range(REWEIGHTED):
         information, moment, misfit = np.zeros((kinds, kinds)), np.zeros(kinds), 0.0
+        levels = []
         for part, least in zip(left, rounding, strict=True):
             rest = part[..., kinds] - part[..., :kinds] @ size
-            freedom = rest.shape[1] - ORDER - 1
+            freedom = rest.shape[1] - order - 1
             noise = (np.sum(np.abs(rest) ** 2, axis=1) + least + np.finfo(float).tiny) / freedom
             products = 2 * np.einsum("cwi,cwj,c->ij", part[..., :kinds].conj(), part, 1 / noise).real
             information, moment = information + products[:, :kinds], moment + products[:, kinds]
+            levels.append(noise)
             misfit += 2 * freedom * float(np.sum(np.log(noise)))
+        if kinds:  # a is that of the noise of two samples
+            information[0, 0] += samples / (2 * float(np.median(np.concatenate(levels))))
         scale = 1 / np.sqrt(np.diag(information))
         covariance = np.linalg.pinv(information * scale[:, None] * scale) * scale[:, None] * scale
         size = covariance @ moment

@@ -37,6 +37,7 @@ EVIDENT = 4.0  # the same, where a transient would cost most of what the windows
 MATERIAL = 1e-9  # of the output's power
 FEWEST = 9  # lines of a response: three windows
 END, STILL = 200, 0.01  # of the samples, at each end, and motion there over that of the record: it rests
+HALF = 0.5  # of the windows
 APART = 2.0  # variances with and without transient, where the two can be told apart
 
 
@@ -98,7 +99,9 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
     Under feedback the input answers the output's noise, too: where that is not small against what the reference does,
     the response errs towards the inverse of the controller.
 
-    A second integrator goes on drifting after the first difference: see :func:`_without_drift`.
+    A second integrator goes on drifting after the first difference: see
+    :func:`identification.sweeps.drift.find_drift`. The delay is that of second differences, where its drift is
+    a constant, and where (1 - 1/z)^2 H is clearly smoother, the quadratic is that one's.
     """
     if np.ptp(y) == 0:
         raise InputError("the output never changes; expected the response to a sweep")
@@ -117,7 +120,8 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
             "(a longer record or a wider sweep)"
         )
     step = float(omega[1] - omega[0])
-    tau = _group_delay(*(np.fft.rfft(np.diff(x, 2), u.size - 1)[periods * (band + 1)] for x in (u, y)), step)
+    bent_u, bent_y = (np.fft.rfft(np.diff(x, 2), u.size - 1)[periods * (band + 1)] for x in (u, y))
+    tau = _group_delay(bent_u, bent_y, step)
 
     def bend(at: Real, poles: int) -> Complex:
         """What H is when (1 - 1/z)^poles H exp(j omega tau) is 1."""
@@ -125,16 +129,17 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
 
     tiles = _tiles(band, SHORTEST_WINDOW)
     looks = tiles, _tiles(band, LONG_WINDOW)
-    once, twice = (find_drift(difference, big_u * bend(omega, poles), big_y, looks) for poles in (1, 2))
+    once, twice = (find_drift(difference, big_u * bend(omega, poles), big_y, looks, u.size) for poles in (1, 2))
     drift, poles = (twice, 2) if once.misfit - twice.misfit > SIGNIFICANT else (once, 1)
-    groups = windows_of(tiles, big_u * bend(omega, poles), big_y - drift.columns @ drift.size)
+    bent = big_u * bend(omega, poles)
+    groups = windows_of(tiles, bent, big_y - drift.columns @ drift.size)
+    fit, rest, cut = _fit(groups, y, held=held)
+    if drift.size.size and np.mean(cut) > HALF:  # the local transients take the drift with them
+        drift, groups = drift.none(), windows_of(tiles, bent, big_y)
+        fit, rest, cut = _fit(groups, y, held=held)
     at_nodes: Real = np.concatenate(
         [_frequencies(omega[tile], group.nodes) for tile, group in zip(tiles, groups, strict=True)]
     )
-    truncated, rest = fit_windows(groups, transient=True), fit_windows(groups, transient=False)
-    blind = not held or _still(y, float(np.median(truncated.noise)))
-    cut = _needs_transient(truncated, rest, groups, blind=blind)
-    fit = truncated.where(cut, rest)
     doubt = _doubt(groups, [drift.columns[tile] for tile in tiles], drift.covariance, cut)
     power = np.concatenate([np.mean(np.abs(group.output) ** 2, axis=1) for group in groups])
     tiny = np.finfo(float).tiny
@@ -152,6 +157,14 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
         excitation=(gain / np.median(gain[usable]))[usable],
         left_out=left_out,
     )
+
+
+def _fit(groups: Sequence[Windows], y: Real, *, held: bool) -> tuple[LocalFit, LocalFit, Flags]:
+    """The windows' fit, that without transients, and in which windows (C,) the former has one."""
+    truncated, rest = fit_windows(groups, transient=True), fit_windows(groups, transient=False)
+    blind = not held or _still(y, float(np.median(truncated.noise)))
+    cut = _needs_transient(truncated, rest, groups, blind=blind)
+    return truncated.where(cut, rest), rest, cut
 
 
 def _doubt(groups: Sequence[Windows], drifts: Sequence[Complex], covariance: Real, cut: Flags) -> Real:

@@ -122,9 +122,10 @@ def fit_windows(groups: Sequence[Windows], *, transient: bool) -> LocalFit:
     return best
 
 
-def unexplained(windows: Windows, spectra: Complex) -> Complex:
-    """What of ``spectra`` (C, W, k) is no quadratic response to the input, (C, W, k)."""
-    q, _ = np.linalg.qr(_columns(windows, 0))
+def unexplained(windows: Windows, spectra: Complex, order: int) -> Complex:
+    """What of ``spectra`` (C, W, k) is no response to the input that is a polynomial of ``order``, (C, W, k)."""
+    powers = windows.place[:, None] ** np.arange(order + 1)
+    q, _ = np.linalg.qr((windows.input / _level(windows.input))[..., None] * powers)
     return np.asarray(spectra - q @ (np.swapaxes(q.conj(), 1, 2) @ spectra))
 
 
