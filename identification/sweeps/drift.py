@@ -37,6 +37,7 @@ class Drift:
     misfit: float
 
     def none(self) -> Drift:
+        """No drift."""
         return replace(self, columns=self.columns[:, :0], size=self.size[:0], covariance=self.covariance[:0, :0])
 
 
@@ -61,8 +62,8 @@ def find_drift(difference: Complex, u: Complex, y: Complex, looks: Sequence[Sequ
     noise of two samples, and b only where the plant has two integrators.
 
     The input of a sweep is so smooth that a response in a short window can hardly be told from b. A long window tells
-    them apart, if a quadratic still is the response in it: what it says must agree with the short windows. Of a and b
-    together, a alone, and neither, the first that is evident is taken.
+    them apart, if a quartic is the response in it: what it says must agree with the short windows. Of a and b together,
+    a alone, and neither, the first that is evident is taken.
 
     References
     ----------
@@ -82,7 +83,7 @@ def find_drift(difference: Complex, u: Complex, y: Complex, looks: Sequence[Sequ
 
 
 def _likeliest(columns: Complex, u: Complex, y: Complex, tiles: Sequence[Whole], order: int, samples: int) -> Drift:
-    """The likeliest size of the drifts if the noise of each window is what a quadratic response and they leave."""
+    """The likeliest size of the drifts if the noise of each window is what a response of ``order`` and they leave."""
     kinds = columns.shape[1]
     spectra = np.concatenate([columns, y[:, None]], axis=1)
     left = [

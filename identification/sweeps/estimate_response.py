@@ -37,7 +37,6 @@ EVIDENT = 4.0  # the same, where a transient would cost most of what the windows
 MATERIAL = 1e-9  # of the output's power
 FEWEST = 9  # lines of a response: three windows
 END, STILL = 200, 0.01  # of the samples, at each end, and motion there over that of the record: it rests
-HALF = 0.5  # of the windows
 APART = 2.0  # variances with and without transient, where the two can be told apart
 
 
@@ -120,8 +119,8 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
             "(a longer record or a wider sweep)"
         )
     step = float(omega[1] - omega[0])
-    bent_u, bent_y = (np.fft.rfft(np.diff(x, 2), u.size - 1)[periods * (band + 1)] for x in (u, y))
-    tau = _group_delay(bent_u, bent_y, step)
+    twice_u, twice_y = (np.fft.rfft(np.diff(x, 2), u.size - 1)[periods * (band + 1)] for x in (u, y))
+    tau = _group_delay(twice_u, twice_y, step)
 
     def bend(at: Real, poles: int) -> Complex:
         """What H is when (1 - 1/z)^poles H exp(j omega tau) is 1."""
@@ -134,7 +133,7 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
     bent = big_u * bend(omega, poles)
     groups = windows_of(tiles, bent, big_y - drift.columns @ drift.size)
     fit, rest, cut = _fit(groups, y, held=held)
-    if drift.size.size and np.mean(cut) > HALF:  # the local transients take the drift with them
+    if drift.size.size and cut[0]:  # it was no drift, which is largest there, but a transient that looks like it above
         drift, groups = drift.none(), windows_of(tiles, bent, big_y)
         fit, rest, cut = _fit(groups, y, held=held)
     at_nodes: Real = np.concatenate(
