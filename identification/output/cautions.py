@@ -109,13 +109,14 @@ def _dead_time(result: FitResult, tests: Sequence[FrequencyResponse]) -> Iterato
 
 
 def _alike(result: FitResult) -> Iterator[str]:
+    best = min(result.alike, key=result.alike.__getitem__, default=None)
     for structure, more in result.alike.items():
         if more > -ALIKE:
             yield f"the data hardly tell this structure from {structure} (its BIC is {more:+.1f})"
-        else:
+        elif structure == best:
             yield (
-                f"the BIC alone would choose {structure} ({more:+.1f}), whose roots outside the band change the "
-                "response by no more than what this class leaves of these data"
+                f"the BIC alone would choose {structure} ({more:+.1f}), with roots far outside the band or that these "
+                "data leave open"
             )
 
 
