@@ -89,6 +89,7 @@ class Selection:
         if self.overdispersion > 1 and self.white(best):
             self.overdispersion = 1.0
             best = self._climb(best)
+        self.fits[best] = [test.other_turns(fit) for test, fit in zip(self.tests, self.fits[best], strict=True)]
         return best
 
     def _overdispersion(self, path: list[Structure]) -> float:
