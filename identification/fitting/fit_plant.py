@@ -94,8 +94,8 @@ def fit_plant(
     Raises
     ------
     InputError
-        Too few lines for the parameters, parameters that the data do not determine, no stable minimum phase
-        plant near the data, or tests that disagree about the gain's sign.
+        Too few lines for the parameters, parameters that the data do not determine, no stable plant near the data, or
+        tests that disagree about the gain's sign.
 
     Notes
     -----
@@ -182,7 +182,8 @@ def _finished(whole: Sequence[ScaledTest], selection: Selection, structure: Stru
     ]
     fits = [test.finish(fit) for test, fit in zip(whole, likely, strict=True)]
     rewritten = [_with_real_roots(test, fit) for test, fit in zip(whole, fits, strict=True)]
-    if selection.wanted.real is not None or len({fit.structure for fit in rewritten}) > 1:
+    asked = selection.wanted.real is not None or selection.wanted.modes is not None
+    if asked or len({fit.structure for fit in rewritten}) > 1:
         return fits
     try:
         real = [test.finish(fit) for test, fit in zip(whole, rewritten, strict=True)]

@@ -139,7 +139,7 @@ def _tests(tests: Sequence[FrequencyResponse]) -> str:
 def _structure(fit: FitRecord) -> str:
     form = "A mode is the factor 1 + 2 zeta s/omega + (s/omega)^2, a real root 1 + s/omega, all 1 at s = 0."
     others = dict(fit.criterion.by_structure)
-    own = others.pop(fit.structure, None)
+    own = others.pop(fit.criterion.chosen, None)
     divisor = fit.criterion.overdispersion
     grown = f" The deviance is divided by {number(divisor)}, since no structure leaves noise." if divisor > 1 else ""
     if own is None or not others:
@@ -147,8 +147,7 @@ def _structure(fit: FitRecord) -> str:
     best = min(others, key=others.__getitem__)
     gain = others[best] - own
     if gain < 0:
-        undetermined = f"{number(-gain)} worse than that of {best}, which the data do not determine"
-        return f"{form} Its BIC is {undetermined}.{grown}"
+        return f"{form} Its BIC is {number(-gain)} worse than that of {best}: see the cautions.{grown}"
     return f"{form} Its BIC is {number(gain)} better than that of the next best, {best}.{grown}"
 
 

@@ -79,7 +79,7 @@ def record_of(plant: PlantModel, tests: list[FrequencyResponse], bound: Additive
         method="maximum likelihood",
         loss="least squares",
         conjugated=False,
-        criterion=Criterion("BIC", 1.0, {str(structure): 5.0, "1 integrator": 99.0}),
+        criterion=Criterion("BIC", 1.0, {str(structure): 5.0, "1 integrator": 99.0}, str(structure)),
         lower=share(0.98),
         upper=share(1.02),
         noise=share(0.003),
@@ -289,7 +289,7 @@ def test_what_the_fit_leaves_is_said():
         misfit=fit.noise,
         cautions=("a median distance of 25 % is more than noise leaves", "no dead time can be told from none"),
         agreement_of_tests=0.5,
-        criterion=Criterion("BIC", 19.5, {fit.structure: 5.0}),
+        criterion=Criterion("BIC", 19.5, {fit.structure: 5.0}, fit.structure),
         checks={
             "day_0.csv": SubspaceCheck(4, 0.01, (found, missed)),
             "day_1.csv": SubspaceCheck(4, 0.01, (replace(found, found_omega=20.5), missed)),
