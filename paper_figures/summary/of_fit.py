@@ -130,9 +130,12 @@ def _tests(tests: Sequence[FrequencyResponse]) -> str:
     counts = Counter(printable(test.path.name) if test.path else test.name for test in tests)
     files = [name if count in (1, len(tests)) else f"{name} ({count} tests)" for name, count in counts.items()]
     low, high = min(test.omega[0] for test in tests), max(test.omega[-1] for test in tests)
+    rest = [lines for test in tests for lines in test.left_out]
+    reasons = "; ".join(dict.fromkeys(lines.reason for lines in rest))
+    left_out = f" {sum(lines.omega.size for lines in rest)} lines are left out ({reasons})." if rest else ""
     return (
         f"{len(tests)} test{'s' if len(tests) > 1 else ''} in {_few(files)}; "
-        f"{sum(test.omega.size for test in tests)} lines from {number(low, 4)} to {number(high, 4)} rad/s."
+        f"{sum(test.omega.size for test in tests)} lines from {number(low, 4)} to {number(high, 4)} rad/s.{left_out}"
     )
 
 
@@ -204,7 +207,11 @@ def _checks(checks: Mapping[str, SubspaceCheck]) -> Iterator[str]:
 
 
 def _cautions(fit: FitRecord) -> list[str]:
-    return [f"{said[0].upper()}{said[1:]}." for said in fit.cautions]
+    return [_sentence(said) for said in fit.cautions]
+
+
+def _sentence(said: str) -> str:
+    return f"{said[0].upper()}{said[1:]}."
 
 
 def _bound(bound: AdditiveBound, report: BoundReport) -> str:
@@ -217,5 +224,7 @@ def _bound(bound: AdditiveBound, report: BoundReport) -> str:
         "lines, as far as was looked, below that of its own fit, "
         f"{number(report.mean_excess)} times their envelope on average and "
         f"{number(report.largest_excess)} times at most (no bound of this order gets below "
-        f"{lower_end(report.least_excess, 3)})." + (f" It touches {', '.join(touches)}." if touches else "")
+        f"{lower_end(report.least_excess, 3)})."
+        + (f" It touches {', '.join(touches)}." if touches else "")
+        + (f" {_sentence(str(report.outside))}" if report.outside else "")
     )
