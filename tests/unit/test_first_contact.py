@@ -21,6 +21,7 @@ from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 from identification.model.structure import Structure, Wanted
 from identification.output.cautions import cautions
+from identification.sweeps.as_fitted import as_fitted
 from identification.sweeps.kept_responses import read_responses, write_responses
 from identification.sweeps.noise_lines import within, without_noise
 from identification.sweeps.response import FrequencyResponse
@@ -296,3 +297,41 @@ def test_intervals_over_few_lines_hold_what_they_say() -> None:
 def test_a_structure_says_what_it_has() -> None:
     structure = Structure(-1, 2, 3, right=1, delayed=False, real_pairs=(0, 0, 1))
     assert str(structure) == ("1 differentiator, 1 zero mode, 1 right-half-plane real zero, 3 real poles, no dead time")
+
+
+# what is compared with the plant afterwards
+
+
+def test_a_plant_is_compared_with_the_tests_as_its_fit_used_them(tmp_path: Path) -> None:
+    """Sweeps that are read again are turned and cut as the fit did; those that it kept are so already."""
+    test = replace(measured(PAIR), response=measured(PAIR).response.conj(), name="reversed")
+    fitted = fit_model([test], band=(1.0, 50.0))
+    write_responses(tmp_path / "kept.npz", fitted.tests)
+    kept = read_responses(tmp_path / "kept.npz")
+    for tests in ([test], kept, as_fitted(fitted.model, [test])):
+        (used,) = as_fitted(fitted.model, tests)
+        np.testing.assert_array_equal(used.response, fitted.tests[0].response)
+        assert sum(lines.omega.size for lines in used.left_out) == test.omega.size - used.omega.size
+        assert used.conjugated
+    again = fit_model(kept)
+    assert again.record.conjugated
+    assert again.record.cautions[0].startswith("the sign of the phase is reversed")
+
+
+def test_a_test_of_another_name_is_left_with_all_its_lines() -> None:
+    model = fit_model([measured(PAIR, name="day 1")], band=(1.0, 50.0)).model
+    (used,) = as_fitted(model, [measured(PAIR, name="day 2")])
+    assert used.omega.size == OMEGA.size
+
+
+def test_noise_alone_is_refused() -> None:
+    rng = np.random.default_rng(1)
+    noise = FrequencyResponse(OMEGA, rng.standard_normal((OMEGA.size, 2)) @ [1, 1j], None, "noise")
+    with pytest.raises(InputError, match="noise: every line is more noise than response"):
+        fit_model([noise])
+
+
+def test_tests_of_different_plants_are_not_cut_as_noise() -> None:
+    plants = [replace(PAIR, gain=gain, delay_s=delay) for gain, delay in ((0.1, 1e-3), (1.0, 9e-3), (4.0, 20e-3))]
+    kept = without_noise([measured(plant, name=str(plant.gain)) for plant in plants])
+    assert all(not test.left_out for test in kept)
