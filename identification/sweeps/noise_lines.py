@@ -28,8 +28,10 @@ def within(test: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyR
     Raises
     ------
     InputError
-        None is within.
+        The two are no band, or no line is within.
     """
+    if not 0 <= low_hz < high_hz:
+        raise InputError(f"the band is {low_hz:g} to {high_hz:g} Hz; expected two frequencies, the lower one first")
     low, high = 2 * np.pi * low_hz * (1 - 1e-12), 2 * np.pi * high_hz * (1 + 1e-12)
     kept = (test.omega >= low) & (test.omega <= high)
     if not kept.any():

@@ -247,6 +247,8 @@ def test_a_band_is_asked_for(tmp_path: Path) -> None:
     assert model.fit.tests[0].band == (test.omega[0], test.omega[-1])
     with pytest.raises(InputError, match=r"has lines from 0.2 to 80 Hz; expected some .* 90 to 100 Hz"):
         within(measured(PAIR), 90.0, 100.0)
+    with pytest.raises(InputError, match="the band is 50 to 1 Hz; expected two frequencies"):
+        identification.fit([measured(PAIR)], band=(50.0, 1.0))
     write_responses(tmp_path / "kept.npz", [test])
     (again,) = read_responses(tmp_path / "kept.npz")
     assert [str(lines) for lines in again.left_out] == [str(lines) for lines in test.left_out]
