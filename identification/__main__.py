@@ -68,8 +68,12 @@ reading_options = together(
         metavar="NAME=OURS,...",
         help='What a file calls a column and we do, such as "Frequency (Hz)=frequency_hz".',
     ),
-    click.option("--node", type=int, help="Of the response, in a universal file of several."),
-    click.option("--direction", type=int, help="Of the response, in a universal file of several."),
+    click.option(
+        "--node",
+        type=int,
+        help="In a universal file of several: of the response, or the reference if only that varies.",
+    ),
+    click.option("--direction", type=int, help="The same, where one node has several."),
     click.option("--resample", is_flag=True, help="Bring records with uneven time stamps to an even grid."),
 )
 """What a file of sweeps does not say itself; the values are those of ``Reading``."""
@@ -87,24 +91,32 @@ def _band(
 
 fit_options = together(
     click.option(
-        "--modes", default="auto", type=Counts(8), metavar="auto|N|Z/P", help="Zero and pole modes.  [default: auto]"
+        "--modes",
+        default="auto",
+        type=Counts(8),
+        metavar="auto|N|Z/P",
+        help="Zero and pole modes, up to 8.  [default: auto]",
     ),
     click.option(
-        "--real", default="auto", type=Counts(3), metavar="auto|N|Z/P", help="Real zeros and poles.  [default: auto]"
+        "--real",
+        default="auto",
+        type=Counts(3),
+        metavar="auto|N|Z/P",
+        help="Real zeros and poles, up to 3.  [default: auto]",
     ),
     click.option(
         "--integrators",
         default="auto",
         type=click.Choice(["auto", "-2", "-1", "0", "1", "2"]),
         show_default=True,
-        help="Poles at s = 0; negative: zeros there.",
+        help="Poles at s = 0; a negative number counts zeros there.",
     ),
     click.option(
         "--band",
         type=(float, float),
         callback=_band,
         metavar="LOW HIGH",
-        help="In Hz, of every test; else noise at both ends of a band is left out.",
+        help="Ends in Hz of the lines that are used; unless given, noise at both ends of a test is left out.",
     ),
     click.option(
         "--loss",
@@ -118,19 +130,19 @@ fit_options = together(
         default=2,
         type=click.IntRange(1, HIGHEST_ORDER),
         show_default=True,
-        help="Of W_a; 2 is Eq. (2.22).",
+        help="Poles of W_a; 2 is Eq. (2.22).",
     ),
     click.option(
         "--bound-below",
         type=click.FloatRange(min=0, min_open=True),
         metavar="LEVEL",
-        help="Most that plants differ from 0 to the lowest line, in output units per input unit; W_a covers it too.",
+        help="Most that plants differ from the model below the lowest line, output unit per input unit; W_a covers it.",
     ),
     click.option(
         "--bound-above",
         type=click.FloatRange(min=0, min_open=True),
         metavar="LEVEL",
-        help="The same above the lines, up to ten times the highest: from there on W_a falls off like 1/s.",
+        help="The same from the highest line to ten times it; above, W_a falls off like 1/s.",
     ),
     click.option("--seed", default=0, type=click.IntRange(min=0), show_default=True, help="Of the random restarts."),
 )
@@ -143,7 +155,7 @@ fit_options = together(
 @click.option(
     "--responses",
     type=OUTPUT_FILE,
-    help="Keep the responses in this .npz, to be given as a SWEEP later.",
+    help="Keep the responses as they were fitted in this .npz, to be given as a SWEEP later.",
 )
 @reading_options
 @fit_options

@@ -11,7 +11,7 @@ import numpy as np
 from identification.base.errors import InputError, shown
 from identification.bound.bound_residuals import bound_residuals
 from identification.fitting.fit_plant import FitResult, fit_plant
-from identification.fitting.other_classes import conjugated, fits_reversed, refuse_unstable
+from identification.fitting.other_classes import fits_reversed, refuse_unstable
 from identification.fitting.single_test_fit import Misfit
 from identification.fitting.subspace_check import check_modes
 from identification.model.fit_record import FitRecord
@@ -21,7 +21,7 @@ from identification.model.reports import BoundReport, SubspaceCheck
 from identification.model.structure import INTEGRATORS, MOST_REAL, Wanted
 from identification.output.fit_facts import fit_record, standard_errors
 from identification.sweeps.noise_lines import within, without_noise
-from identification.sweeps.response import FrequencyResponse, alias_free
+from identification.sweeps.response import FrequencyResponse, alias_free, conjugated
 
 MOST_MODES = 8
 
@@ -113,7 +113,7 @@ def _fit_either_sign(
     if fits_reversed(tests, wanted, distance, soft=soft):
         turned = [conjugated(test) for test in tests]
         return turned, fit_plant(turned, wanted, soft=soft, seed=seed, tick=tick), distance
-    refuse_unstable(tests[0], result, distance)
+    refuse_unstable(tests[0], None if result is None else result.structure, distance)
     if refusal is not None:
         raise refusal
     assert result is not None

@@ -59,8 +59,8 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
 def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
     """Sum up MODEL, fitted to SWEEP files, its designs, and what was refused: summary.pdf, .svg, .png and .txt."""
     from identification.model.model_file import read_model
+    from identification.sweeps.as_fitted import as_fitted
     from identification.sweeps.read_sweeps import read_sweeps
-    from identification.sweeps.response import alias_free
     from paper_figures.look import style
     from paper_figures.result_tables import sentences_of
     from paper_figures.summary import page
@@ -68,7 +68,7 @@ def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
     from paper_figures.summary.words import summarise
 
     identified = read_model(model)
-    tests = [alias_free(test, identified.plant) for test in read_sweeps(sweeps)]
+    tests = as_fitted(identified, read_sweeps(sweeps))
     designs, outcomes = read_build(build, "summary")
     with sentences_of(summaries(outcomes), build / "results", "summary", model):
         said = summarise(identified, tests, designs, outcomes)

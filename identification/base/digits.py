@@ -27,3 +27,8 @@ def told_apart(first: float, second: float, digits: int, said: Callable[[float, 
 
 def _rounded(value: float, digits: int, rounding: str) -> str:
     return f"{float(Context(prec=digits, rounding=rounding).create_decimal(repr(float(value)))):.{digits}g}"
+
+
+def percent(share: float) -> str:
+    """A share in percent: two digits, or whole numbers from 100."""
+    return f"{100 * share:.2g}" if share < 1 else f"{100 * share:.0f}"

@@ -33,6 +33,12 @@ def same_turn(omega: Real) -> float | None:
     return 2 * np.pi / spacing if abs(halves - np.rint(halves)) < SAME else None
 
 
+def turns_sign(omega: Real) -> bool:
+    """Whether :func:`same_turn` seconds turn the phase by half a turn, at all lines."""
+    spacing = spacing_of(omega)
+    return spacing is not None and bool(np.rint(2 * omega[0] / spacing) % 2)
+
+
 def group_delay(omega: Real, response: Complex) -> float:
     """The dead time in seconds that the phase increments between neighbouring lines agree on best.
 

@@ -13,7 +13,7 @@ from identification.model.structure import Structure
 
 ITERATIONS = 8
 UNTHREADED = 100_000  # multiplications of a matrix product; threads cost more than they bring at this size
-TURNS = 0.2  # cost a line that a dead time of a turn or more has to gain
+TURNS = 0.05  # cost a line that a dead time of a turn or more has to gain
 LEAST_ZETA = 1e-5  # of a mode
 APART = 1.05  # least zeta of a mode that is written as two real roots
 BAND = 10.0  # modes are sought up to this factor outside the band

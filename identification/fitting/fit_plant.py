@@ -19,7 +19,7 @@ from identification.model.structure import Structure, Wanted
 from identification.sweeps.response import FrequencyResponse, alias_free, require_one_band
 
 MOST_ALIKE = 3  # structures that are named beside the chosen one
-OPEN = 3.5  # half width of the interval of a gain, a logarithm, from which the data do not determine it
+OPEN = 3.5  # half width of the interval of a gain or a root, a logarithm, from which the data do not determine it
 FAR = 2.0  # times as far from the tests as the plant of least criterion
 CORRELATED = 0.3  # correlation of neighbouring residuals above which a fit may have missed something
 APART = 2.0  # standard errors of their distance by which two real roots are told from a mode of zeta near 1
@@ -41,7 +41,7 @@ class FitResult:
         Bayesian information criterion, summed over the tests, of each structure that was fitted to all.
     alike
         By how much the criterion of other structures differs from that of the chosen one, where it hardly tells them
-        apart, and where it is less: the chosen one has fewer roots outside the band.
+        apart, and where it is less: the chosen one has fewer roots outside the band, or roots that the data determine.
     overdispersion
         By what the deviance is divided in the criterion; above 1 the residuals are no noise.
     soft
@@ -94,8 +94,8 @@ def fit_plant(
     Raises
     ------
     InputError
-        Too few lines for the parameters, parameters that the data do not determine, no stable minimum phase
-        plant near the data, or tests that disagree about the gain's sign.
+        Too few lines for the parameters, parameters that the data do not determine, no stable plant near the data, or
+        tests that disagree about the gain's sign.
 
     Notes
     -----
@@ -142,7 +142,7 @@ def fit_plant(
         nominal = nominal_of(whole, fits)
         distances = tuple(median_distance(nominal.plant, test) for test in tests)
         if found is not None and max(distances) > FAR * max(found.distances):
-            break  # a plant that is as good as any but for its gain is better than one that is not
+            break  # a plant that fits, with roots that are open, is better than one that does not fit
         result = FitResult(
             nominal=nominal,
             tests=tuple(fits),
@@ -156,7 +156,9 @@ def fit_plant(
             overdispersion=selection.overdispersion,
             soft=soft,
         )
-        if nominal.half_widths[0] < OPEN:
+        told = nominal.structure.frequencies()
+        told[0] = True
+        if np.all(nominal.half_widths[told] < OPEN):
             return result
         found = found or result
     if found is None:
@@ -180,7 +182,8 @@ def _finished(whole: Sequence[ScaledTest], selection: Selection, structure: Stru
     ]
     fits = [test.finish(fit) for test, fit in zip(whole, likely, strict=True)]
     rewritten = [_with_real_roots(test, fit) for test, fit in zip(whole, fits, strict=True)]
-    if selection.wanted.real is not None or len({fit.structure for fit in rewritten}) > 1:
+    asked = selection.wanted.real is not None or selection.wanted.modes is not None
+    if asked or len({fit.structure for fit in rewritten}) > 1:
         return fits
     try:
         real = [test.finish(fit) for test, fit in zip(whole, rewritten, strict=True)]

@@ -21,9 +21,11 @@ GROWN_ZETAS = (0.02, 0.15)
 GROWN_APART = 0.5  # largest first distance between the new zero and pole, in logarithms
 OUTSIDE = 2.5  # factor from the band's edge beyond which a root may be one that the plant does not have
 DAMPED = np.log(0.3)  # a mode better damped than this may be a real root and one far away
+ALL_PASSES = ((0, 0, -1, -1), (0, 0, -2, -2))
+"""Steps that take off what a dead time looks like."""
 STEPS = (
     *((0, -2, 0, -2), (0, -1, 0, -1), (0, -2, 0, 0), (0, 0, 0, -2), (0, -1, 0, 0), (0, 0, 0, -1)),
-    *((0, 0, -1, 0), (0, 0, -2, 0), (0, 0, -1, -1), (0, 0, -2, -2)),
+    *((0, 0, -1, 0), (0, 0, -2, 0), *ALL_PASSES),
     *((-1, -1, 0, 0), (1, 0, 0, -1), (-1, 0, 0, 1), (1, 1, 0, 0), (-2, -2, 0, 0), (2, 0, 0, -2)),
     *((0, 0, 0, 1), (0, 1, 0, 0), (0, 1, 0, 1)),
 )
@@ -33,8 +35,14 @@ FLIPS = ((0, -1, 1, 0), (0, -2, 2, 0), (0, 1, -1, 0), (0, 2, -2, 0))
 
 
 def neighbours(structure: Structure) -> list[Structure]:
-    """The structures one step away: those of STEPS and FLIPS, and the one without or with a dead time."""
-    return [*stepped(structure, (*STEPS, *FLIPS)), replace(structure, delayed=not structure.delayed)]
+    """The structures one step away: those of STEPS and FLIPS, and the one without or with a dead time.
+
+    A zero on the right and a pole may be what a dead time looks like: they may go for one.
+    """
+    near = [*stepped(structure, (*STEPS, *FLIPS)), replace(structure, delayed=not structure.delayed)]
+    if not structure.delayed:
+        near += [replace(other, delayed=True) for other in stepped(structure, ALL_PASSES)]
+    return near
 
 
 def stepped(structure: Structure, steps: Sequence[tuple[int, int, int, int]]) -> list[Structure]:
@@ -49,21 +57,32 @@ def stepped(structure: Structure, steps: Sequence[tuple[int, int, int, int]]) ->
 
 def reached_from(fit: Likely, target: Structure, omega: Real) -> list[Real]:
     """First guesses (p,) of a neighbour of ``fit.structure``, in no order."""
-    delay = fit.theta[-1] if target.delayed else 0.0
     sides = _sides_of(fit)
     changes = [there - here for here, there in zip(fit.structure.degrees, target.degrees, strict=True)]
-    if changes[0] * changes[1] < 0:
-        source, goal = (0, 1) if changes[0] < 0 else (1, 0)
-        towards_right = 1 if source == 0 else -1
-        found = []
-        for one, other, lag in _mirrored(sides[source], sides[goal], changes[goal]):
-            zeros = (one, other) if source == 0 else (other, one)
-            found += [_joined(zeros[0], zeros[1], sides[2], h) for h in {delay, max(0.0, delay - towards_right * lag)}]
-        return found
-    return [
-        _joined(left, right, poles, delay)
-        for left, right, poles in product(*(_changed(*pair, omega) for pair in zip(sides, changes, strict=True)))
-    ]
+    if changes[0] < 0 < changes[1]:
+        found = [(left, right, sides[2]) for left, right in _mirrored(sides[0], sides[1], changes[1])]
+    elif changes[1] < 0 < changes[0]:
+        found = [(left, right, sides[2]) for right, left in _mirrored(sides[1], sides[0], changes[0])]
+    else:
+        lefts, rights, poles = (_changed(side, change, omega) for side, change in zip(sides, changes, strict=True))
+        found = list(product(lefts, rights, poles))
+    starts = []
+    for there in found:
+        delays = {fit.theta[-1]} if target.delayed else {0.0}
+        if target.delayed and target.right != fit.structure.right:  # as late at low frequencies as before
+            delays.add(max(0.0, fit.theta[-1] + _lag(*sides) - _lag(*there)))
+        starts += [_joined(*there, delay) for delay in delays]
+    return starts
+
+
+def _lag(left: Side, right: Side, poles: Side) -> float:
+    """The delay at low frequencies of zeros on both sides and of poles."""
+
+    def of(side: Side) -> float:
+        modes, rates = side
+        return float(np.sum(2 * np.exp(modes[:, 1] - modes[:, 0])) + np.sum(np.exp(-rates)))
+
+    return of(right) + of(poles) - of(left)
 
 
 def _sides_of(fit: Likely) -> tuple[Side, Side, Side]:
@@ -77,22 +96,21 @@ def _joined(left: Side, right: Side, poles: Side, delay: float) -> Real:
     return np.concatenate([[0.0], *modes, *rates, [delay]])
 
 
-def _mirrored(source: Side, goal: Side, count: int) -> Iterator[tuple[Side, Side, float]]:
-    """Both sides after ``count`` roots, 1 or 2, went from one to the other, and the dead time that looks alike."""
+def _mirrored(source: Side, goal: Side, count: int) -> Iterator[tuple[Side, Side]]:
+    """Both sides after ``count`` roots, 1 or 2, went from one to the other."""
     modes, rates = source
     if count == 2:
-        for i, (log_omega, log_zeta) in enumerate(modes):
-            lag = 4 * float(np.exp(log_zeta - log_omega))
-            yield (np.delete(modes, i, axis=0), rates), (np.vstack([goal[0], modes[i]]), goal[1]), lag
+        for i in range(len(modes)):
+            yield (np.delete(modes, i, axis=0), rates), (np.vstack([goal[0], modes[i]]), goal[1])
         return
     for i, rate in enumerate(rates):
-        yield (modes, np.delete(rates, i)), _with_root(*goal, rate), 2 * float(np.exp(-rate))
+        yield (modes, np.delete(rates, i)), _with_root(*goal, rate)
     for i, (log_omega, log_zeta) in enumerate(modes):
         if log_zeta > DAMPED:
             spread = float(np.arccosh(max(1.0, np.exp(log_zeta))))
             for shift in {-spread, spread}:
                 kept = _with_root(np.delete(modes, i, axis=0), rates, log_omega - shift)
-                yield kept, _with_root(*goal, log_omega + shift), 2 * float(np.exp(-log_omega - shift))
+                yield kept, _with_root(*goal, log_omega + shift)
 
 
 def _changed(side: Side, change: int, omega: Real) -> list[Side]:

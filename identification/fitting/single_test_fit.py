@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
-from identification.fitting.dead_time import same_turn
+from identification.fitting.dead_time import MORE_TURNS, same_turn, spacing_of, turn_of
 from identification.fitting.first_guess import guesses
 from identification.fitting.least_squares import information, response_of
 from identification.fitting.likelihood import Likely, Lines, maximise
@@ -112,6 +112,18 @@ class ScaledTest:
     def as_well(self, mine: Likely, other: ScaledTest, theirs: Likely) -> bool:
         """Whether this test is explained as well as another one."""
         return mine.deviance / self.omega.size < theirs.deviance / other.omega.size + ALIKE
+
+    def other_turns(self, so_far: Likely) -> Likely:
+        """The likeliest of ``so_far`` and of dead times some turns of equally spaced lines away, if these tell them."""
+        best = so_far
+        if so_far.structure.delayed and spacing_of(self.omega) is not None and same_turn(self.omega) is None:
+            for turns in range(-MORE_TURNS, MORE_TURNS + 1):
+                theta = so_far.theta.copy()
+                theta[-1] += turns * turn_of(self.omega)
+                if turns and theta[-1] >= 0:
+                    found = self._maximise(so_far.structure, theta, self._sigma(so_far), to_beat=best.deviance)
+                    best = min(best, found, key=lambda likely: likely.deviance)
+        return best
 
     def restart(self, so_far: Likely, rng: np.random.Generator) -> Likely:
         """The likeliest of ``so_far`` and of random modes within the band."""

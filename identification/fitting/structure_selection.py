@@ -30,6 +30,7 @@ LEVELLED = 0.2  # of the path's largest gain, below which gains are taken for th
 SUPERFLUOUS = 8.0  # deviance that a mode pair too many takes off a test's white residuals; 4 to 10 seen
 ALIKE = 6.0  # criteria closer than this are no strong evidence (Raftery, Sociol. Methodol. 25, 1995)
 MATERIAL = 4.0  # times the median distance, that a root outside the band changes the response near its edge
+LITTLE = 0.25  # deviance a line
 AT_EDGE = 1.02  # times the end of the search
 HOPELESS = 20.0  # criterion lost on the first tests after which the others are not asked
 
@@ -89,6 +90,7 @@ class Selection:
         if self.overdispersion > 1 and self.white(best):
             self.overdispersion = 1.0
             best = self._climb(best)
+        self.fits[best] = [test.other_turns(fit) for test, fit in zip(self.tests, self.fits[best], strict=True)]
         return best
 
     def _overdispersion(self, path: list[Structure]) -> float:
@@ -200,7 +202,8 @@ class Selection:
         """What is left of a structure without the roots that the first test puts far outside the band.
 
         That is fitted, and returned if the criterion does not speak strongly against it, or if those roots are where
-        the search ends and change less than MATERIAL times what the model leaves at a line. It counts as ``tried``.
+        the search ends, change less than MATERIAL times what the model leaves at a line, and explain LITTLE. It counts
+        as ``tried``.
         """
         first = self.tests[0]
         left = within_band(self.fits[here][0], first.omega)
@@ -214,8 +217,9 @@ class Selection:
             self.tick()
         worse = self.criterion(there) - self.criterion(here)
         most = min(AT_EDGE / BAND, MATERIAL * first.distance(self.fits[here][0]))
-        immaterial = not self.white(here) and left[2] < most
-        return there if worse < ALIKE or (immaterial and worse < np.inf) else here
+        lines = sum(test.omega.size for test in self.tests)
+        immaterial = left[2] < most and self.overdispersion * worse < LITTLE * lines and not self.white(here)
+        return there if worse < ALIKE or immaterial else here
 
     def _mirrored(self, here: Structure) -> Structure:
         """The likeliest of a structure and of those in which one of its zeros is mirrored on the imaginary axis."""

@@ -48,7 +48,8 @@ def choose_variables(path: Path, variables: Scope, meant: Mapping[str, str]) -> 
     translated = {name: ours for name, ours in meant.items() if name in everything}
     if translated:
         beside = {name: each for prefix in ("", *map(_prefix, translated)) for name, each in scopes[prefix].items()}
-        found = {name: (each, 1.0) for name, each in beside.items() if _is_usable(name, each)}
+        renamed = {name.removeprefix(_prefix(name)) for name in translated}
+        found = {name: (each, 1.0) for name, each in beside.items() if _is_usable(name, each) and name not in renamed}
         others = [name for name in found if name not in translated.values()]
         for name, ours in translated.items():
             if not _is_usable(ours, everything[name]):

@@ -39,11 +39,14 @@ class Criterion:
         By what the deviance is divided; 1 where some structure leaves noise.
     by_structure
         Its value for each structure that was tried.
+    chosen
+        Which of these it is; the structure's own name may have two real roots for a mode of zeta > 1.
     """
 
     name: str
     overdispersion: float
     by_structure: Mapping[str, float]
+    chosen: str
 
 
 @dataclass(frozen=True)

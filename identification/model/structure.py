@@ -153,6 +153,11 @@ class Structure:
         there = replace(self, real_pairs=(pairs[0], pairs[1], pairs[2]))
         return there, np.concatenate([theta[:1], *(part.ravel() for part in parts), theta[-1:]])
 
+    @property
+    def as_chosen(self) -> Structure:
+        """The same degrees, with two real roots written as a mode, as structures are compared."""
+        return replace(self, real_pairs=(0, 0, 0))
+
     def plant(self, theta: Real, sign: float) -> PlantModel:
         """The plant of theta in physical units; ``sign`` is the gain's."""
         left_modes, right_modes, pole_modes, left_rates, right_rates, real_poles = map(np.exp, self.split(theta))

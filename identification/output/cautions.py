@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from identification.base.arrays import Real
-from identification.fitting.dead_time import same_turn
+from identification.base.digits import percent
+from identification.fitting.dead_time import same_turn, turns_sign
 from identification.fitting.first_guess import BAND, LEAST_ZETA, most_zeta
 from identification.fitting.fit_plant import FitResult
 from identification.fitting.neighbouring_structures import OUTSIDE
@@ -29,7 +30,7 @@ def cautions(result: FitResult, tests: Sequence[FrequencyResponse], reversed_fro
     """
     edges = _edges(result.plant, np.concatenate([test.omega for test in tests]))
     return [
-        *_reversed(result, reversed_from),
+        *_reversed(result, tests, reversed_from),
         *_misfit(result),
         *_open(result, edges),
         *_dead_time(result, tests),
@@ -37,24 +38,26 @@ def cautions(result: FitResult, tests: Sequence[FrequencyResponse], reversed_fro
     ]
 
 
-def _reversed(result: FitResult, reversed_from: float | None) -> Iterator[str]:
-    if reversed_from is not None:
+def _reversed(result: FitResult, tests: Sequence[FrequencyResponse], reversed_from: float | None) -> Iterator[str]:
+    if any(test.conjugated for test in tests):
         own = max(test.distance for test in result.tests)
-        before = f"as it is at {100 * reversed_from:.2g} %" if np.isfinite(reversed_from) else "as it is not at all"
+        before = "as it is does not fit"
+        if reversed_from is not None and np.isfinite(reversed_from):
+            before = f"as it is at {percent(reversed_from)} %"
         yield (
-            f"the sign of the phase is reversed: the conjugate fits at {100 * own:.2g} %, the response {before}; if a "
-            "lag is negative in these files, the plant is unstable and this is another"
+            f"the sign of the phase is reversed: the conjugate fits at {percent(own)} %, the response {before}; if "
+            "your files count a lag as negative, the plant is unstable and not the one fitted"
         )
 
 
 def _misfit(result: FitResult) -> Iterator[str]:
     own, nominal = max(test.distance for test in result.tests), max(result.distances)
     if own > POOR and max(test.relative for test in result.tests) > POOR:
-        yield f"a median distance of {100 * own:.2g} % is more than noise leaves on a plant of this class"
+        yield f"a median distance of {percent(own)} % is more than noise leaves on a plant of this class"
     if nominal > POOR and nominal > WORSE * own:
         yield (
-            f"the plant is the mean of plants that differ much: it misses a test by {100 * nominal:.2g} %, whose own "
-            f"fit misses it by {100 * own:.2g} % at most; the tests hardly are of one plant"
+            f"the plant is the mean of plants that differ much: it misses a test by {percent(nominal)} %, whose own "
+            f"fit misses it by {percent(own)} % at most; the tests hardly are of one plant"
         )
 
 
@@ -75,9 +78,10 @@ def _edges(plant: PlantModel, omega: Real) -> dict[str, str]:
         elif parameter.kind not in ("gain", "delay_s") and not low / OUTSIDE < size < high * OUTSIDE:
             side, end, ideal = ("below", low / BAND, "one at s = 0") if size < low else ("above", high * BAND, "none")
             where = ", where the search ends" if abs(np.log(size / end)) < AT_EDGE else ""
+            which = "lowest" if side == "below" else "highest"
             said[parameter.name] = (
-                f"{_name(parameter)} is {size:.4g} rad/s{where}, {side} all lines ({low:.4g} to {high:.4g} rad/s): "
-                f"these data hardly tell it from {ideal}"
+                f"{_name(parameter)} is {size:.4g} rad/s{where}, {side} all lines ({low:.4g} to {high:.4g} rad/s): it "
+                f"rests on what little it changes at the {which} of them, instead of {ideal}"
             )
     return said
 
@@ -102,21 +106,20 @@ def _dead_time(result: FitResult, tests: Sequence[FrequencyResponse]) -> Iterato
     turns = [same_turn(test.omega) for test in tests if test.record is None]
     if len(turns) == len(tests) and all(turns):
         turn = max(turn or 0.0 for turn in turns)
+        sign = " (an odd one turns the gain's sign)" if any(turns_sign(test.omega) for test in tests) else ""
         yield (
             f"the lines are equally spaced: they do not tell a dead time of {delay_s:.4g} s from that plus any "
-            f"multiple of {turn:.4g} s"
+            f"multiple of {turn:.4g} s{sign}"
         )
 
 
 def _alike(result: FitResult) -> Iterator[str]:
-    for structure, more in result.alike.items():
-        if more > -ALIKE:
-            yield f"the data hardly tell this structure from {structure} (its BIC is {more:+.1f})"
-        else:
-            yield (
-                f"the BIC alone would choose {structure} ({more:+.1f}), whose roots outside the band change the "
-                "response by no more than what this class leaves of these data"
-            )
+    near = [f"{structure} ({more:+.1f})" for structure, more in result.alike.items() if more > -ALIKE]
+    better = [f"{structure} ({more:+.1f})" for structure, more in result.alike.items() if more <= -ALIKE]
+    if better:
+        yield f"the BIC alone would choose {better[0]}, with roots far outside the band or that these data leave open"
+    if near:
+        yield f"structures within {ALIKE:g} of its BIC: {'; '.join(near)}"
 
 
 def _name(parameter: Parameter) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import floor, log10
 
 from identification.base.arrays import Real
-from identification.base.digits import lower_end
+from identification.base.digits import lower_end, percent
 from identification.base.files import is_file, read_bytes
 from identification.fitting.fit_plant import FitResult
 from identification.fitting.one_fit import OneFit
@@ -52,6 +52,7 @@ def fit_record(
             name="BIC",
             overdispersion=result.overdispersion,
             by_structure={str(structure): value for structure, value in result.criterion.items()},
+            chosen=str(result.structure.as_chosen),
         ),
         lower=_numbers(lower),
         upper=_numbers(upper),
@@ -61,7 +62,7 @@ def fit_record(
         agreement_of_tests=nominal.agreement,
         tests=tuple(_test_record(test, fit) for test, fit in zip(tests, result.tests, strict=True)),
         median_distances=result.distances,
-        conjugated=reversed_from is not None,
+        conjugated=any(test.conjugated for test in tests),
         cautions=tuple(cautions(result, tests, reversed_from)),
         bound=report,
         checks=checks,
@@ -150,11 +151,11 @@ def remarks(result: FitResult) -> list[str]:
     """Sentences on what the numbers rest on: structure, tests, residuals."""
     count = len(result.tests)
     said = [f"{result.structure}; {count} test{'s' if count > 1 else ''}"]
-    distance = 100 * max(test.distance for test in result.tests)
-    of_plant = 100 * max(result.distances)
-    said.append(f"median distance of a test from this plant: at most {of_plant:.2g} % of the response")
+    most = "at most " if count > 1 else ""
+    said.append(f"median distance of a test from this plant: {most}{percent(max(result.distances))} % of the response")
     if count > 1:
-        said.append(f"median distance of a test from its own fit: at most {distance:.2g} %")
+        own = max(test.distance for test in result.tests)
+        said.append(f"median distance of a test from its own fit: {most}{percent(own)} %")
     if count > 1 and result.nominal.scattered:
         said.append("the tests differ by more than their noise: intervals by Student's distribution of the scatter")
     elif count > 1:

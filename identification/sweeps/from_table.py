@@ -20,6 +20,7 @@ CONSTANT = 1e-9  # of a signal's size
 LARGEST = 1e50  # number in a column
 MOST_POINTS = 20_000_000  # lines or samples of a test; a fit takes some 200 bytes of memory for each
 ROUNDING = 1e-4  # of a coherence outside 0 to 1
+ALMOST, FILTERED = 0.95, 0.01  # of half the sampling rate; of the power, what a filter may leave there
 GROWTH = 0.5  # power of omega: a response that leads and grows faster over its band is one from output to input
 
 
@@ -167,6 +168,12 @@ def from_record(table: Table, name: str, *, resample: bool) -> FrequencyResponse
         estimate = estimate_response(sampling_s, record.input, record.output, held=held)
     except InputError as error:
         table.refuse(str(error))
+    remarks = table.remarks
+    if not held and _reaches_nyquist(record, estimate.omega):
+        remarks += (
+            "the input has power up to half the sampling rate, which no filter before a converter leaves: if a "
+            'converter holds it from sample to sample, name it input_held (--columns "input=input_held")',
+        )
     return FrequencyResponse(
         estimate.omega,
         estimate.response,
@@ -177,8 +184,17 @@ def from_record(table: Table, name: str, *, resample: bool) -> FrequencyResponse
         synthetic=table.synthetic,
         record=record,
         path=table.path,
-        remarks=table.remarks,
+        remarks=remarks,
     )
+
+
+def _reaches_nyquist(record: Record, omega: Real) -> bool:
+    """Whether the input's power just below half the sampling rate is a good part of that at the lines ``omega``."""
+    power = np.abs(np.fft.rfft(record.input - np.mean(record.input))) ** 2
+    line = 2 * np.pi / (record.input.size * record.sampling_s)
+    first, last = np.rint(omega[[0, -1]] / line).astype(int)
+    top = power[int(ALMOST * power.size) :]
+    return bool(np.mean(top) > FILTERED * np.median(power[first : last + 1]))
 
 
 def _lead(record: Record) -> float:

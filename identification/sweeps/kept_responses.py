@@ -32,6 +32,7 @@ def write_responses(path: Path, tests: Sequence[FrequencyResponse]) -> None:
             name=[test.name for test in tests],
             path=[str(test.path or "") for test in tests],
             synthetic=[test.synthetic for test in tests],
+            conjugated=[test.conjugated for test in tests],
             remarks=["\n".join(test.remarks) for test in tests],
             **{name: curve for name, curve in curves.items() if curve is not None},
         )
@@ -67,6 +68,7 @@ def read_responses(path: Path) -> list[FrequencyResponse]:
                     LeftOut(content[f"omega_{i}_{j}"], content[f"response_{i}_{j}"], str(reason))
                     for j, reason in enumerate(content.get(f"left_out_{i}", ()))
                 ),
+                conjugated=bool(content["conjugated"][i]) if "conjugated" in content else False,
                 remarks=tuple(str(content["remarks"][i]).splitlines()) if "remarks" in content else (),
             )
             for i, name in enumerate(content["name"])

@@ -18,6 +18,7 @@ HALF = 0.5  # share of the power that is noise, above which a line says nothing
 COHERENT = 0.5  # coherence below which more than half of the output's power is noise
 SAID = 3.0  # lines of noise that one line of signal outweighs
 LEAST = 12.0  # lines of noise, less SAID for each other one, that are left out
+AGREE, QUARTER = 0.3, 0.25  # scatter over the mean of tests of one plant, at a share of the lines at least
 FEWEST_TESTS = 3  # whose scatter tells noise
 
 
@@ -27,8 +28,10 @@ def within(test: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyR
     Raises
     ------
     InputError
-        None is within.
+        The two are no band, or no line is within.
     """
+    if not 0 <= low_hz < high_hz:
+        raise InputError(f"the band is {low_hz:g} to {high_hz:g} Hz; expected two frequencies, the lower one first")
     low, high = 2 * np.pi * low_hz * (1 - 1e-12), 2 * np.pi * high_hz * (1 + 1e-12)
     kept = (test.omega >= low) & (test.omega <= high)
     if not kept.any():
@@ -37,11 +40,16 @@ def within(test: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyR
             f"{test.name}: has lines from {first:.6g} to {last:.6g} Hz; expected some in the band asked for, "
             f"{low_hz:.6g} to {high_hz:.6g} Hz"
         )
-    return _only(test, kept, "outside the band asked for")
+    return only(test, kept, "outside the band asked for")
 
 
 def without_noise(tests: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
     """The tests without the lines at both ends of their bands that are mostly noise.
+
+    Raises
+    ------
+    InputError
+        All lines of a test are.
 
     Notes
     -----
@@ -95,7 +103,9 @@ def _scattered(tests: Sequence[FrequencyResponse]) -> Flags:
         return np.zeros(1, dtype=bool)
     responses = np.array([test.response for test in tests])
     ratio = np.abs(responses.std(axis=0, ddof=1)) / np.maximum(np.abs(responses.mean(axis=0)), np.finfo(float).tiny)
-    return _running(ratio, WINDOW) > 1
+    noisy = _running(ratio, WINDOW) > 1
+    of_one_plant = np.quantile(ratio, QUARTER) < AGREE
+    return noisy if of_one_plant else np.zeros(1, dtype=bool)
 
 
 def _trimmed(test: FrequencyResponse, noisy: Flags) -> FrequencyResponse:
@@ -105,10 +115,13 @@ def _trimmed(test: FrequencyResponse, noisy: Flags) -> FrequencyResponse:
         total = np.cumsum(score[side])
         if total.max() >= LEAST:
             kept[side][: int(np.argmax(total)) + 1] = False
-    return test if kept.all() else _only(test, kept, "more noise than response")
+    if not kept.any():
+        raise InputError(f"{test.name}: every line is more noise than response; expected lines that show the plant")
+    return test if kept.all() else only(test, kept, "more noise than response")
 
 
-def _only(test: FrequencyResponse, kept: Flags, reason: str) -> FrequencyResponse:
+def only(test: FrequencyResponse, kept: Flags, reason: str) -> FrequencyResponse:
+    """The test's lines where ``kept`` (M,) holds, which are some; the others are left out for the ``reason``."""
     if kept.all():
         return test
     rest = LeftOut(test.omega[~kept], test.response[~kept], reason)

@@ -95,6 +95,8 @@ class FrequencyResponse:
         Lines that are not used.
     remarks
         What was left out or changed while the test was read.
+    conjugated
+        Whether the sign of the phase is another than that in the file.
     """
 
     omega: Real
@@ -107,6 +109,7 @@ class FrequencyResponse:
     path: Path | None = None
     left_out: tuple[LeftOut, ...] = ()
     remarks: tuple[str, ...] = ()
+    conjugated: bool = False
 
     def __post_init__(self) -> None:
         omega, response = np.asarray(self.omega, dtype=float), np.asarray(self.response, dtype=complex)
@@ -161,4 +164,10 @@ def alias_free(test: FrequencyResponse, plant: PlantModel) -> FrequencyResponse:
     """The response of a test without the aliases that a held input puts on that of ``plant``; others as they are."""
     if test.record is None or not test.record.held:
         return test
-    return replace(test, response=test.response - aliases(plant, test.record.sampling_s, test.omega))
+    return replace(test, response=test.response - aliases(plant, test.record.sampling_s, test.omega), record=None)
+
+
+def conjugated(test: FrequencyResponse) -> FrequencyResponse:
+    """The test with the sign of its phase reversed, also at the lines that are left out."""
+    left = tuple(replace(lines, response=lines.response.conj()) for lines in test.left_out)
+    return replace(test, response=test.response.conj(), left_out=left, conjugated=not test.conjugated)

@@ -29,12 +29,11 @@ def lead_time(omega: Real, response: Complex) -> float:
 
     Notes
     -----
-    The plants of Thesis Eq. (2.20) have no zeros in the right half plane, so that their magnitude tells their phase
-    but for the dead time (Bode). That phase is taken off, with the magnitude going on as a power of omega outside the
-    band, and what is left is turned back by leads and dead times tau: exp(j omega tau) aligns all lines if
-    tau is the dead time. What lies just above the band bends the phase near the top, so a lead has to align both
-    halves of the rest, and each better than any dead time does. It also has to turn the phase by more than one
-    turn over the band: less may be a plant's zeros.
+    The magnitude of a plant without zeros in the right half plane tells its phase but for the dead time (Bode). That
+    phase is taken off, with the magnitude going on as a power of omega outside the band, and what is left is turned
+    back by leads and dead times tau: exp(j omega tau) aligns all lines if tau is the dead time. What lies just above
+    the band bends the phase near the top, so a lead has to align both halves of the rest, and each better than any
+    dead time does. It also has to turn the phase by more than one turn over the band: less may be a plant's zeros.
     """
     spacing = np.median(np.diff(omega)) / omega[-1]
     lines = np.flatnonzero(response)

@@ -15,7 +15,8 @@ from identification.base.errors import InputError
 from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
-from identification.sweeps.response import FrequencyResponse, alias_free
+from identification.sweeps.as_fitted import as_fitted
+from identification.sweeps.response import FrequencyResponse
 from paper_figures.look.style import styled
 
 MEASURED: dict[str, Any] = {
@@ -52,7 +53,7 @@ def plot_bode(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> Fig
     model
         The plant and its additive bound.
     tests
-        One or more responses; the aliases of a held input are taken away.
+        One or more responses, see :func:`identification.sweeps.as_fitted.as_fitted`.
 
     Returns
     -------
@@ -62,7 +63,7 @@ def plot_bode(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> Fig
     if not tests:
         raise InputError("no test was given; expected one or more responses")
     plant, bound = model.plant, model.additive_bound
-    clean = [alias_free(test, plant) for test in tests]
+    clean = as_fitted(model, tests)
     figure = Figure(figsize=(5.2, 6.2), layout="constrained")
     magnitude, phase, distance = figure.subplots(3, 1, sharex=True)
     kinds = {"synthetic" if test.synthetic else "measured" for test in tests}

@@ -96,7 +96,7 @@ def paragraphs(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> tu
     """
     fit = fitted(model)
     return (
-        ("Tests", _tests(tests)),
+        ("Tests", _tests(tests, fit)),
         ("Structure", _structure(fit)),
         ("Intervals", _intervals(fit)),
         ("Residuals", _residuals(fit)),
@@ -126,20 +126,26 @@ def _few(names: Sequence[str]) -> str:
     return ", ".join(names if len(names) <= MOST_NAMES else [*names[:2], "...", names[-1]])
 
 
-def _tests(tests: Sequence[FrequencyResponse]) -> str:
+def _tests(tests: Sequence[FrequencyResponse], fit: FitRecord) -> str:
     counts = Counter(printable(test.path.name) if test.path else test.name for test in tests)
     files = [name if count in (1, len(tests)) else f"{name} ({count} tests)" for name, count in counts.items()]
     low, high = min(test.omega[0] for test in tests), max(test.omega[-1] for test in tests)
+    rest = [lines for test in tests for lines in test.left_out]
+    reasons = "; ".join(dict.fromkeys(lines.reason for lines in rest))
+    left_out = f" {sum(lines.omega.size for lines in rest)} lines are left out ({reasons})." if rest else ""
+    remarks = "; ".join(dict.fromkeys(said for test in fit.tests for said in test.remarks))
+    as_read = f" As read: {remarks}." if remarks else ""
     return (
         f"{len(tests)} test{'s' if len(tests) > 1 else ''} in {_few(files)}; "
         f"{sum(test.omega.size for test in tests)} lines from {number(low, 4)} to {number(high, 4)} rad/s."
+        f"{left_out}{as_read}"
     )
 
 
 def _structure(fit: FitRecord) -> str:
     form = "A mode is the factor 1 + 2 zeta s/omega + (s/omega)^2, a real root 1 + s/omega, all 1 at s = 0."
     others = dict(fit.criterion.by_structure)
-    own = others.pop(fit.structure, None)
+    own = others.pop(fit.criterion.chosen, None)
     divisor = fit.criterion.overdispersion
     grown = f" The deviance is divided by {number(divisor)}, since no structure leaves noise." if divisor > 1 else ""
     if own is None or not others:
@@ -147,8 +153,7 @@ def _structure(fit: FitRecord) -> str:
     best = min(others, key=others.__getitem__)
     gain = others[best] - own
     if gain < 0:
-        undetermined = f"{number(-gain)} worse than that of {best}, which the data do not determine"
-        return f"{form} Its BIC is {undetermined}.{grown}"
+        return f"{form} Its BIC is {number(-gain)} worse than that of {best}: see the cautions.{grown}"
     return f"{form} Its BIC is {number(gain)} better than that of the next best, {best}.{grown}"
 
 
@@ -205,7 +210,11 @@ def _checks(checks: Mapping[str, SubspaceCheck]) -> Iterator[str]:
 
 
 def _cautions(fit: FitRecord) -> list[str]:
-    return [f"{said[0].upper()}{said[1:]}." for said in fit.cautions]
+    return [_sentence(said) for said in fit.cautions]
+
+
+def _sentence(said: str) -> str:
+    return f"{said[0].upper()}{said[1:]}."
 
 
 def _bound(bound: AdditiveBound, report: BoundReport) -> str:
@@ -218,5 +227,7 @@ def _bound(bound: AdditiveBound, report: BoundReport) -> str:
         "lines, as far as was looked, below that of its own fit, "
         f"{number(report.mean_excess)} times their envelope on average and "
         f"{number(report.largest_excess)} times at most (no bound of this order gets below "
-        f"{lower_end(report.least_excess, 3)})." + (f" It touches {', '.join(touches)}." if touches else "")
+        f"{lower_end(report.least_excess, 3)})."
+        + (f" It touches {', '.join(touches)}." if touches else "")
+        + (f" {_sentence(str(report.outside))}" if report.outside else "")
     )

@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 
 from identification.model.model_file import IdentifiedModel
-from identification.sweeps.response import FrequencyResponse, alias_free
+from identification.sweeps.as_fitted import as_fitted
+from identification.sweeps.response import FrequencyResponse
 
 
 def additive_error_tables(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> dict[str, pd.DataFrame]:
@@ -22,7 +23,7 @@ def additive_error_tables(model: IdentifiedModel, tests: Sequence[FrequencyRespo
         error/bound and where it is.
     """
     frames = []
-    for number, test in enumerate(tests, start=1):
+    for number, test in enumerate(as_fitted(model, tests), start=1):
         s = 1j * test.omega
         nominal = model.plant(s)
         frames.append(
@@ -30,7 +31,7 @@ def additive_error_tables(model: IdentifiedModel, tests: Sequence[FrequencyRespo
                 {
                     "test": number,
                     "omega": test.omega,
-                    "error": np.abs(nominal - alias_free(test, model.plant).response),
+                    "error": np.abs(nominal - test.response),
                     "bound": np.abs(model.additive_bound(s)),
                     "plant": np.abs(nominal),
                 }

@@ -19,8 +19,9 @@ from identification.base.files import is_file, read_bytes
 from identification.base.manifest import require_as_written
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
+from identification.sweeps.as_fitted import as_fitted
 from identification.sweeps.read_sweeps import KEPT, input_files, read_sweeps
-from identification.sweeps.response import FrequencyResponse, alias_free
+from identification.sweeps.response import FrequencyResponse
 from paper_figures.summary.of_designs import FOLLOWING
 
 Kind = TypeVar("Kind")
@@ -127,7 +128,7 @@ def read_inputs(
 
     designs, outcomes = without_path(designs), without_path(outcomes)
     identified = asked_model(model)
-    tests = [alias_free(test, identified.plant) for test in read_sweeps(sweeps)]
+    tests = as_fitted(identified, read_sweeps(sweeps))
     files += dict.fromkeys([*(test.path for test in tests if test.path), *input_files(sweeps)])
     hashes += [(path.name, sha256(read_bytes(path)).hexdigest()) for path in files if path.suffix != KEPT]
     for source in SOURCES:
