@@ -219,9 +219,16 @@ class ScaledTest:
         structure, sigma = likely.structure, self._sigma(likely)
         curvature = information(structure, likely.theta, self.omega, sigma)
         scale = 1 / np.sqrt(np.diag(curvature))
-        values, vectors = np.linalg.eigh(curvature * scale[:, None] * scale)
+        correlations = curvature * scale[:, None] * scale
+        if not (structure.delayed or np.linalg.eigvalsh(correlations)[0] > SINGULAR):
+            # what looks like a dead time is not asked for; by itself it would be as sure as this
+            correlations[-1, :-1] = correlations[:-1, -1] = 0.0
+        values, vectors = np.linalg.eigh(correlations)
         if not values[0] > SINGULAR:
-            raise Undetermined(f"{self.name}: the data do not determine {structure}; expected fewer or more lines")
+            raise Undetermined(
+                f"{self.name}: the data do not determine {structure}; expected other numbers of modes and real roots, "
+                "or lines where these show"
+            )
         units = np.append(np.ones(structure.size - 1), 1 / self.centre)
         weighted = vectors * (scale * units)[:, None]
         return np.asarray(spread * (weighted / values) @ weighted.T)

@@ -32,6 +32,8 @@ ALIKE = 6.0  # criteria closer than this are no strong evidence (Raftery, Sociol
 MATERIAL = 4.0  # times the median distance, that a root outside the band changes the response near its edge
 LITTLE = 0.25  # deviance a line
 AT_EDGE = 1.02  # times the end of the search
+HIDDEN = 30.0  # of the criterion: evidence for a pole or zero at s = 0 that roots below the band cancel
+LAST_RESORT = 1e12  # above every criterion
 HOPELESS = 20.0  # criterion lost on the first tests after which the others are not asked
 
 
@@ -94,9 +96,13 @@ class Selection:
         return best
 
     def _overdispersion(self, path: list[Structure]) -> float:
-        """Median of the path's small gains a test over that of a superfluous pair; 1 without several small gains."""
+        """Median of the path's small gains a test over that of a superfluous pair; 1 without several small gains.
+
+        They are those after the last large one: before it the plant itself is not found yet.
+        """
         gains = -np.diff([self._deviance(structure) for structure in path]) / len(self.tests)
-        small = gains[gains < LEVELLED * gains.max(initial=0.0)]
+        large = np.flatnonzero(gains >= LEVELLED * gains.max(initial=0.0))
+        small = gains[large[-1] + 1 :] if large.size else gains[:0]
         return max(1.0, float(np.median(small)) / SUPERFLUOUS) if small.size > 1 else 1.0
 
     def _climb(self, best: Structure) -> Structure:
@@ -122,7 +128,10 @@ class Selection:
             best = better
 
     def criterion(self, structure: Structure) -> float:
-        """Bayesian information criterion, summed over the tests; infinite for what is not admitted."""
+        """Bayesian information criterion, summed over the tests; infinite for what is not admitted.
+
+        It is at LAST_RESORT for what is taken only if there is nothing else.
+        """
         if not self.wanted.admits(structure):
             return np.inf
         return sum(map(self._criterion_of, range(len(self.tests)), self.fits[structure]))
@@ -251,11 +260,11 @@ class Selection:
         return True
 
     def _criterion_of(self, i: int, fit: Likely) -> float:
-        """The criterion of one test; infinite where a mode pair explains one line or no line shows what is at s = 0."""
+        """The criterion of one test: HIDDEN more where no line shows what is at s = 0; LAST_RESORT of needles."""
         omega = self.tests[i].omega
-        if has_needle(fit, omega) or (self.wanted.integrators is None and cancels_origin(fit, omega)):
-            return np.inf
-        return fit.deviance / self.overdispersion + self._penalty(i, fit.structure)
+        hidden = HIDDEN * (self.wanted.integrators is None and cancels_origin(fit, omega))
+        needle = LAST_RESORT * has_needle(fit, omega)
+        return fit.deviance / self.overdispersion + self._penalty(i, fit.structure) + hidden + needle
 
     def _deviance(self, structure: Structure) -> float:
         return sum(fit.deviance for fit in self.fits[structure])
