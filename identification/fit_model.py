@@ -24,6 +24,7 @@ from identification.sweeps.noise_lines import within, without_noise
 from identification.sweeps.response import FrequencyResponse, alias_free, conjugated
 
 MOST_MODES = 8
+BY_CHANCE = 4.5  # times the noise: no line of some thousand is missed by more by chance
 
 Tick = Callable[[], object]
 
@@ -108,6 +109,8 @@ def _fit_either_sign(
     result, refusal, distance = None, None, np.inf
     try:
         result = fit_plant(tests, wanted, soft=soft, seed=seed, tick=tick)
+        if not any(test.misfit or test.worst > BY_CHANCE for test in result.tests):
+            return tests, result, None
         distance = max(test.distance for test in result.tests)
     except (Misfit, Undetermined) as error:
         refusal = error

@@ -12,7 +12,7 @@ from identification.fitting.dead_time import same_turn, turns_sign
 from identification.fitting.first_guess import BAND, LEAST_ZETA, most_zeta
 from identification.fitting.fit_plant import FitResult
 from identification.fitting.neighbouring_structures import OUTSIDE
-from identification.fitting.structure_selection import ALIKE
+from identification.fitting.structure_selection import ALIKE, RUN
 from identification.model.parameter import Parameter
 from identification.model.plant import PlantModel
 from identification.sweeps.response import FrequencyResponse, alias_free
@@ -20,7 +20,7 @@ from identification.sweeps.response import FrequencyResponse, alias_free
 POOR = 0.15  # median distance of a test from its own fit
 WORSE = 3.0  # times the distance of a test from its own fit
 AT_EDGE = 0.02  # of the search, a logarithm
-OUTLIER, RUN = 12.0, 4.0  # times the noise that a line, and five beside each other in the median, are missed
+OUTLIER = 12.0  # times the noise, that a line is missed
 OPEN = 10.0  # ratio of the ends of an interval
 
 
@@ -60,7 +60,7 @@ def _outliers(result: FitResult, tests: Sequence[FrequencyResponse]) -> Iterator
             sigma = sigma * np.sqrt(test.excitation)
         miss = np.abs(alias_free(test, fit.plant).response - fit.plant(1j * test.omega)) / sigma
         worst = int(np.argmax(miss))
-        around = np.median(miss[max(0, worst - 2) : worst + 3])
+        around = np.median(miss[max(0, worst - 1) : worst + 2])
         where = f"{test.name}: the plant misses the line at {test.omega[worst] / (2 * np.pi):.4g} Hz"
         if miss[worst] > OUTLIER and around < OUTLIER / 3:
             mended = "the loss is soft-L1 for it" if result.soft else "--loss soft-l1 lets it hardly count"
