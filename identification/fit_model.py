@@ -19,6 +19,7 @@ from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
 from identification.model.reports import BoundReport, SubspaceCheck
 from identification.model.structure import INTEGRATORS, MOST_REAL, Wanted
+from identification.output.cautions import POOR
 from identification.output.fit_facts import fit_record, standard_errors
 from identification.sweeps.noise_lines import within, without_noise
 from identification.sweeps.response import FrequencyResponse, alias_free, conjugated
@@ -106,15 +107,16 @@ def _fit_either_sign(
     tests: Sequence[FrequencyResponse], wanted: Wanted, *, soft: bool, seed: int, tick: Tick
 ) -> tuple[Sequence[FrequencyResponse], FitResult, float | None]:
     """The tests as they were fitted, the fit, and, if their phase is reversed, the misfit before; None if it is not."""
-    result, refusal, distance = None, None, np.inf
+    result, refusal, distance, stands_out = None, None, np.inf, True
     try:
         result = fit_plant(tests, wanted, soft=soft, seed=seed, tick=tick)
-        if not any(test.misfit or test.worst > BY_CHANCE for test in result.tests):
-            return tests, result, None
         distance = max(test.distance for test in result.tests)
+        stands_out = any(test.worst > BY_CHANCE for test in result.tests)
+        if distance < POOR and not stands_out and not any(test.misfit for test in result.tests):
+            return tests, result, None
     except (Misfit, Undetermined) as error:
         refusal = error
-    if not soft and has_outliers(tests[0], wanted, distance):
+    if not soft and (stands_out or distance > POOR) and has_outliers(tests[0], wanted, distance):
         return _fit_either_sign(tests, wanted, soft=True, seed=seed, tick=tick)
     if fits_reversed(tests, wanted, distance, soft=soft):
         turned = [conjugated(test) for test in tests]

@@ -13,7 +13,8 @@ from identification.fitting.likelihood import Likely
 from identification.fitting.nominal_plant import Nominal, nominal_of
 from identification.fitting.one_fit import OneFit
 from identification.fitting.single_test_fit import Misfit, ScaledTest, Undetermined
-from identification.fitting.structure_selection import ALIKE, LAST_RESORT, Selection
+from identification.fitting.structure_fits import ALIKE, LAST_RESORT
+from identification.fitting.structure_selection import Selection
 from identification.model.plant import PlantModel
 from identification.model.structure import Structure, Wanted
 from identification.sweeps.response import FrequencyResponse, alias_free, require_one_band

@@ -16,11 +16,12 @@ from identification.model.structure import Structure, Wanted
 from identification.sweeps.response import FrequencyResponse, conjugated
 
 SUSPECT = 0.03  # median distance of a test from its own fit, above which another class is looked at
+NUMBERS = 3  # that a test has for each parameter, at least
 LIKELY = 0.1  # median distance of a conjugate that is taken
 ALIKE = 1.5  # times as far, that two plants fit alike
 BETTER = 3.0  # times nearer, as a class has to be that is taken for the right one
 RICHEST = Structure(0, 6, 6)  # that is looked at for unstable poles
-SIMPLER = tuple(Structure(0, n, n) for n in range(1, 5))
+SIMPLER = tuple(Structure(0, zeros, n) for n in range(5) for zeros in sorted({0, n}))
 
 
 def fits_reversed(tests: Sequence[FrequencyResponse], wanted: Wanted, distance: float, *, soft: bool) -> bool:
@@ -31,13 +32,16 @@ def fits_reversed(tests: Sequence[FrequencyResponse], wanted: Wanted, distance: 
     """
     if distance < SUSPECT or any(test.record is not None for test in tests):
         return False
+    if BETTER * _with_unstable_poles(conjugated(tests[0]), RICHEST)[0] > ALIKE * distance:
+        return False
     try:
         result = fit_plant([conjugated(tests[0])], wanted, soft=soft)
     except InputError:
         return False
     found = result.tests[0].distance
     unstable, poles, structure = _with_unstable_poles(tests[0], result.structure)
-    simpler = result.structure.free <= structure.free or not poles.size
+    _, its_poles, its_structure = _with_unstable_poles(conjugated(tests[0]), result.structure)
+    simpler = not poles.size or (not its_poles.size and its_structure.free <= structure.free)
     return BETTER * found < distance and found < LIKELY and found < ALIKE * unstable and simpler
 
 
@@ -86,7 +90,7 @@ def _with_unstable_poles(test: FrequencyResponse, structure: Structure) -> tuple
     scaled = ScaledTest(grouped(test), soft=False)
     response = scaled.lines.response
     sigma = np.asarray(np.sqrt(np.abs(response) ** 2 * scaled.lines.excitation))
-    every = (*SIMPLER, structure, RICHEST)
+    every = [each for each in (*SIMPLER, structure, RICHEST) if NUMBERS * each.free < 2 * scaled.omega.size]
     tried = [(*unstable_poles(scaled.omega, response, sigma, each), each) for each in every]
     nearest = min(found for found, _, _ in tried)
     found, poles, which = next(each for each in tried if each[0] <= ALIKE * nearest)

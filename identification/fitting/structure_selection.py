@@ -2,71 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
 import numpy as np
 
 from identification.base.arrays import Real
 from identification.base.errors import InputError
 from identification.fitting.first_guess import BAND
-from identification.fitting.likelihood import Likely
 from identification.fitting.neighbouring_structures import (
     FLIPS,
     GROWTH,
     OUTSIDE,
-    cancels_origin,
-    has_needle,
     neighbours,
-    reached_from,
     stepped,
     within_band,
 )
-from identification.fitting.single_test_fit import ScaledTest
-from identification.model.structure import INTEGRATORS, Structure, Wanted
+from identification.fitting.structure_fits import ALIKE, StructureFits
+from identification.model.structure import INTEGRATORS, Structure
 
 MOST_MODES = 8
 BEHIND = 1.0  # deviance a line, behind the best number of integrators, at which another one is given up
-WHITE = 0.1  # correlation of neighbouring residuals below which nothing is left to explain
 FRUITLESS = 2  # rows of the path without a better structure after which it ends
 LEVELLED = 0.2  # of the path's largest gain, below which gains are taken for those of superfluous pairs
 SUPERFLUOUS = 8.0  # deviance that a mode pair too many takes off a test's white residuals; 4 to 10 seen
-ALIKE = 6.0  # criteria closer than this are no strong evidence (Raftery, Sociol. Methodol. 25, 1995)
 MATERIAL = 4.0  # times the median distance, that a root outside the band changes the response near its edge
 LITTLE = 0.25  # deviance a line
 AT_EDGE = 1.02  # times the end of the search
-RUN = 3.5  # times the noise, that two of three neighbouring lines are missed by chance once in 1e9
-HIDDEN = 30.0  # of the criterion: evidence for a pole or zero at s = 0 that roots below the band cancel
-LAST_RESORT = 1e12  # above every criterion
-HOPELESS = 20.0  # criterion lost on the first tests after which the others are not asked
 
 
-class Selection:
-    """Fits of several tests by several structures.
-
-    Parameters
-    ----------
-    tests
-        Each is fitted on its own.
-    wanted
-        What the user admits.
-    tick
-        Called after each fit of a test.
-
-    Attributes
-    ----------
-    fits
-        For each structure fitted, one fit a test.
-    overdispersion
-        By what the deviance is divided in the criterion: 1 for errors that are noise.
-    """
-
-    def __init__(self, tests: list[ScaledTest], wanted: Wanted, tick: Callable[[], object]) -> None:
-        self.tests = tests
-        self.wanted = wanted
-        self.tick = tick
-        self.fits: dict[Structure, list[Likely]] = {}
-        self.overdispersion = 1.0
+class Selection(StructureFits):
+    """The search for the structure that the data ask for; see :class:`StructureFits` for what it holds."""
 
     def search(self) -> Structure:
         """The admitted structure of least criterion that is found.
@@ -96,15 +59,25 @@ class Selection:
         if self.overdispersion > 1 and self.white(best):
             self.overdispersion = 1.0
             best = self._climb(best)
+        best = self._with_most_integrators(best)
         self.fits[best] = [test.other_turns(fit) for test, fit in zip(self.tests, self.fits[best], strict=True)]
         return best
+
+    def _with_most_integrators(self, best: Structure) -> Structure:
+        """Of structures no richer that the criterion hardly tells apart, that with the most poles at s = 0."""
+        near = [other for other in self.fits if self.criterion(other) < self.criterion(best) + ALIKE]
+        no_richer = [other for other in near if other.free <= best.free and other.right <= best.right]
+        most = max((other.integrators for other in no_richer), default=0)
+        if most <= max(best.integrators, 0):
+            return best
+        return min((other for other in no_richer if other.integrators == most), key=self.criterion)
 
     def _overdispersion(self, path: list[Structure]) -> float:
         """Median of the path's small gains a test over that of a superfluous pair; 1 without several small gains.
 
         They are those after the last large one: before it the plant itself is not found yet.
         """
-        gains = -np.diff([self._deviance(structure) for structure in path]) / len(self.tests)
+        gains = -np.diff([self.deviance(structure) for structure in path]) / len(self.tests)
         large = np.flatnonzero(gains >= LEVELLED * gains.max(initial=0.0))
         small = gains[large[-1] + 1 :] if large.size else gains[:0]
         return max(1.0, float(np.median(small)) / SUPERFLUOUS) if small.size > 1 else 1.0
@@ -118,38 +91,18 @@ class Selection:
         while True:
             better, is_white = best, self.white(best)
             for step in [*neighbours(best), *stepped(best, [] if is_white else [GROWTH])]:
-                if step in tried or not self._affordable(step) or not self.wanted.admits(step):
+                if step in tried or not self.affordable(step) or not self.wanted.admits(step):
                     continue
                 if is_white and step.right > best.right:
                     continue  # noise cannot ask for a zero in the right half plane
                 tried.add(step)
-                if self._step(best, step) and self._preference(step) < self._preference(better):
+                if self.step(best, step) and self.preference(step) < self.preference(better):
                     better = step
             if better == best:
                 better = self._shed(best, tried)
             if better == best:
                 return best
             best = better
-
-    def criterion(self, structure: Structure) -> float:
-        """Bayesian information criterion, summed over the tests; infinite for what is not admitted.
-
-        It is at LAST_RESORT for what is taken only if there is nothing else.
-        """
-        if not self.wanted.admits(structure):
-            return np.inf
-        return sum(map(self._criterion_of, range(len(self.tests)), self.fits[structure]))
-
-    def _preference(self, structure: Structure) -> float:
-        return self.criterion(structure) + ALIKE * structure.right
-
-    def white(self, structure: Structure) -> bool:
-        """Whether a structure leaves nothing to explain in any test."""
-        pairs = zip(self.tests, self.fits[structure], strict=True)
-        return all(
-            test.exact(fit) or (test.correlation(fit) < max(WHITE, test.chance) and test.worst_run(fit) < RUN)
-            for test, fit in pairs
-        )
 
     def _path(self) -> list[Structure]:
         """Structures that grow by one zero mode and one pole mode at a time; those admitted are never none."""
@@ -167,21 +120,21 @@ class Selection:
                 Structure(q, zeros - right - min(max(-q, 0), open_zeros), poles, right, real_pairs=pairs)
                 for q in integrators
             ]
-            row = [structure for structure in row if structure.proper and self._affordable(structure)]
+            row = [structure for structure in row if structure.proper and self.affordable(structure)]
             if not row:
                 continue
             leader: Structure | None = None
             for structure in row:
-                self._fit(structure, leader)
-                leader = min(leader or structure, structure, key=self._deviance)
+                self.fit(structure, leader)
+                leader = min(leader or structure, structure, key=self.deviance)
             assert leader is not None
             path.append(leader)
             self._shed(leader, set())
             right = self._mirrored(leader).right
             if len(path) > 1:
-                limit = self._deviance(leader) + BEHIND * sum(test.omega.size for test in self.tests)
-                row = [structure for structure in row if self._deviance(structure) < limit]
-            integrators = [structure.integrators for structure in sorted(row, key=self._deviance)]
+                limit = self.deviance(leader) + BEHIND * sum(test.omega.size for test in self.tests)
+                row = [structure for structure in row if self.deviance(structure) < limit]
+            integrators = [structure.integrators for structure in sorted(row, key=self.deviance)]
             best = min(self.fits, key=self.criterion)
             if self.wanted.admits(best):
                 fruitless = 0 if best != last else fruitless + 1
@@ -191,28 +144,6 @@ class Selection:
         if not any(self.wanted.admits(structure) for structure in path):
             self._refuse()
         return path
-
-    def _fit(self, structure: Structure, rival: Structure | None) -> None:
-        """Each test on its own; one that another test's parameters explain as well needs no guesses of its own.
-
-        The search for guesses ends early where they stay far behind a rival structure.
-        """
-        below = self.fits.get(replace(structure, zeros=structure.zeros - 2, poles=structure.poles - 2))
-        to_beat = [fit.deviance for fit in self.fits[rival]] if rival else [np.inf] * len(self.tests)
-        fits: list[Likely] = []
-        for i, test in enumerate(self.tests):
-            leader = min(range(i), key=lambda k: fits[k].deviance / self.tests[k].omega.size, default=None)
-            fit = test.follow(self.tests[leader], fits[leader]) if leader is not None else None
-            if fit is None or leader is None or not test.as_well(fit, self.tests[leader], fits[leader]):
-                own = test.fit(structure, below[i] if below else None, to_beat[i])
-                fit = own if fit is None or own.deviance < fit.deviance else fit
-            fits.append(fit)
-            self.tick()
-        leader = min(range(len(fits)), key=lambda k: fits[k].deviance / self.tests[k].omega.size)
-        for i, test in enumerate(self.tests):
-            if not test.as_well(fits[i], self.tests[leader], fits[leader]):
-                fits[i] = min(fits[i], test.follow(self.tests[leader], fits[leader]), key=lambda fit: fit.deviance)
-        self.fits[structure] = fits
 
     def _shed(self, here: Structure, tried: set[Structure]) -> Structure:
         """What is left of a structure without the roots that the first test puts far outside the band.
@@ -249,51 +180,9 @@ class Selection:
             return here
         better = here
         for there in stepped(here, FLIPS):
-            if there not in self.fits and self._affordable(there) and self._step(here, there):
-                better = min(better, there, key=self._deviance)
-        return better if self._deviance(better) < self._deviance(here) - ALIKE * len(self.tests) else here
-
-    def _step(self, here: Structure, there: Structure) -> bool:
-        """Fit a neighbour from the parameters of ``here``; False when the first tests say that it is worse."""
-        fits: list[Likely] = []
-        lost = 0.0
-        for i, (test, known) in enumerate(zip(self.tests, self.fits[here], strict=True)):
-            penalty = self._penalty(i, there) - self._penalty(i, here)
-            to_beat = known.deviance - self.overdispersion * (penalty - HOPELESS)
-            grows = there.poles > here.poles + 1
-            starts = test.grown_from(known) if grows else reached_from(known, there, test.omega)
-            if not starts:
-                return False
-            found = test.pursue(there, starts, known, to_beat)
-            fits.append(found)
-            lost += self._criterion_of(i, found) - self._criterion_of(i, known)
-            self.tick()
-            if lost > HOPELESS:
-                return False
-        self.fits[there] = fits
-        return True
-
-    def _criterion_of(self, i: int, fit: Likely) -> float:
-        """The criterion of one test: HIDDEN more where no line shows what is at s = 0; LAST_RESORT of needles."""
-        omega = self.tests[i].omega
-        hidden = HIDDEN * (self.wanted.integrators is None and cancels_origin(fit, omega))
-        needle = LAST_RESORT * has_needle(fit, omega)
-        return fit.deviance / self.overdispersion + self._penalty(i, fit.structure) + hidden + needle
-
-    def _deviance(self, structure: Structure) -> float:
-        return sum(fit.deviance for fit in self.fits[structure])
-
-    def _penalty(self, i: int, structure: Structure) -> float:
-        """k log n, n numbers being two a line, for few lines more (McQuarrie, Stat. Probab. Lett. 44, 1999).
-
-        The noise has two of the k parameters.
-        """
-        n, k = 2 * self.tests[i].omega.size, structure.free + 2
-        return float(k * np.log(n) * n / (n - k - 2))
-
-    def _affordable(self, structure: Structure) -> bool:
-        """Whether every test has twice as many numbers as there are parameters."""
-        return all(test.omega.size >= structure.free + 2 for test in self.tests)
+            if there not in self.fits and self.affordable(there) and self.step(here, there):
+                better = min(better, there, key=self.deviance)
+        return better if self.deviance(better) < self.deviance(here) - ALIKE * len(self.tests) else here
 
     def _refuse(self) -> None:
         shortest = min(self.tests, key=lambda test: test.omega.size)

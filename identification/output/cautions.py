@@ -12,7 +12,7 @@ from identification.fitting.dead_time import same_turn, turns_sign
 from identification.fitting.first_guess import BAND, LEAST_ZETA, most_zeta
 from identification.fitting.fit_plant import FitResult
 from identification.fitting.neighbouring_structures import OUTSIDE
-from identification.fitting.structure_selection import ALIKE, RUN
+from identification.fitting.structure_fits import ALIKE, RUN
 from identification.model.parameter import Parameter
 from identification.model.plant import PlantModel
 from identification.sweeps.response import FrequencyResponse, alias_free

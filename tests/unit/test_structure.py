@@ -85,12 +85,12 @@ def test_roots_far_outside_the_band_are_left_out() -> None:
     structure = Structure(1, 0, 4)
     slow_and_fast = [np.log(np.sqrt(0.003 * 300)), np.log((0.003 + 300) / (2 * np.sqrt(0.003 * 300)))]
     theta = np.array([0.0, *slow_and_fast, 0.2, -2.0, 0.1])
-    left = within_band(Likely(structure, theta, 1.0, 0.1, 0.1, 0.0), OMEGA)
+    left = within_band(Likely(structure, theta, 1.0, 0.1, 0.1, 0.0), OMEGA, 2.5)
     assert left is not None
     assert left[0] == Structure(2, 0, 2)
     np.testing.assert_allclose(left[1], [0.0, 0.2, -2.0, 0.1])
     inside = np.array([0.0, 0.2, -2.0, 0.1])
-    assert within_band(Likely(Structure(2, 0, 2), inside, 1.0, 0.1, 0.1, 0.0), OMEGA) is None
+    assert within_band(Likely(Structure(2, 0, 2), inside, 1.0, 0.1, 0.1, 0.0), OMEGA, 2.5) is None
 
 
 def test_what_is_wanted() -> None:
