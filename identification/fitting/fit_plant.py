@@ -12,8 +12,8 @@ from identification.fitting.grouped_lines import grouped
 from identification.fitting.likelihood import Likely
 from identification.fitting.nominal_plant import Nominal, nominal_of
 from identification.fitting.one_fit import OneFit
-from identification.fitting.single_test_fit import ScaledTest, Undetermined
-from identification.fitting.structure_selection import ALIKE, Selection
+from identification.fitting.single_test_fit import Misfit, ScaledTest, Undetermined
+from identification.fitting.structure_selection import ALIKE, LAST_RESORT, Selection
 from identification.model.plant import PlantModel
 from identification.model.structure import Structure, Wanted
 from identification.sweeps.response import FrequencyResponse, alias_free, require_one_band
@@ -129,24 +129,23 @@ def fit_plant(
         test.restart(fit, rng) if test.correlation(fit) > CORRELATED else fit for test, fit in pairs
     ]
     criterion = {structure: selection.criterion(structure) for structure in selection.fits}
-    criterion = {structure: value for structure, value in criterion.items() if np.isfinite(value)}
+    criterion = {structure: value for structure, value in criterion.items() if value < LAST_RESORT or structure == best}
+    nearest = max(test.distance(fit) for test, fit in zip(selection.tests, selection.fits[best], strict=True))
     # exact data leave a richer structure nothing but rounding to explain
     simpler = [s for s in criterion if s.size < best.size]
-    undetermined, found = None, None
+    refusal: InputError | None = None
+    found: list[FitResult] = []
     for structure in [best, *sorted(simpler, key=criterion.__getitem__)]:
         try:
             fits = _finished(whole, selection, structure)
-        except Undetermined as error:
-            undetermined = undetermined or error
+        except (Undetermined, Misfit) as error:
+            refusal = refusal or error
             continue
         nominal = nominal_of(whole, fits)
-        distances = tuple(median_distance(nominal.plant, test) for test in tests)
-        if found is not None and max(distances) > FAR * max(found.distances):
-            break  # a plant that fits, with roots that are open, is better than one that does not fit
         result = FitResult(
             nominal=nominal,
             tests=tuple(fits),
-            distances=distances,
+            distances=tuple(median_distance(nominal.plant, test) for test in tests),
             criterion=criterion,
             alike={
                 other: value - criterion[structure]
@@ -158,13 +157,14 @@ def fit_plant(
         )
         told = nominal.structure.frequencies()
         told[0] = True
-        if np.all(nominal.half_widths[told] < OPEN):
+        if np.all(nominal.half_widths[told] < OPEN) and max(fit.distance for fit in fits) < FAR * nearest:
             return result
-        found = found or result
-    if found is None:
-        assert undetermined is not None
-        raise undetermined
-    return found
+        found.append(result)
+    if not found:
+        assert refusal is not None
+        raise refusal
+    # a plant that fits, with roots that are open, is better than one that does not fit
+    return min(found, key=lambda result: max(fit.distance for fit in result.tests))
 
 
 def median_distance(plant: PlantModel, test: FrequencyResponse) -> float:

@@ -21,6 +21,8 @@ GROWN_ZETAS = (0.02, 0.15)
 GROWN_APART = 0.5  # largest first distance between the new zero and pole, in logarithms
 OUTSIDE = 2.5  # factor from the band's edge beyond which a root may be one that the plant does not have
 DAMPED = np.log(0.3)  # a mode better damped than this may be a real root and one far away
+GROWTH = (0, 2, 0, 2)
+"""One more zero mode and pole mode."""
 ALL_PASSES = ((0, 0, -1, -1), (0, 0, -2, -2))
 """Steps that take off what a dead time looks like."""
 STEPS = (
@@ -141,13 +143,13 @@ def _with_root(modes: Real, rates: Real, place: float) -> Side:
     return np.concatenate([modes, [mode]]), rates[:0]
 
 
-def within_band(fit: Likely, omega: Real) -> tuple[Structure, Real, float] | None:
-    """What is left of a fit without its roots far outside the band: slow ones are at s = 0, fast ones are nothing.
+def within_band(fit: Likely, omega: Real, reach: float) -> tuple[Structure, Real, float] | None:
+    """What is left of a fit without its roots ``reach`` times outside the band: slow ones at s = 0, fast ones nothing.
 
     None if no root is that far, or more poles or zeros would be at s = 0 than INTEGRATORS has. Else the structure, a
     first guess (p,) and what such a root changes at a line, as a share of the response: at most about that.
     """
-    low, high = np.log(omega[0] / OUTSIDE), np.log(omega[-1] * OUTSIDE)
+    low, high = np.log(omega[0] / reach), np.log(omega[-1] * reach)
     kept, slow, nearest = zip(*(_kept(side, low, high) for side in _sides_of(fit)), strict=True)
     left, right, poles = (2 * len(modes) + len(rates) for modes, rates in kept)
     integrators = fit.structure.integrators + slow[2] - slow[0] - slow[1]
@@ -155,7 +157,7 @@ def within_band(fit: Likely, omega: Real) -> tuple[Structure, Real, float] | Non
     if there == fit.structure or not (there.proper and integrators in INTEGRATORS):
         return None
     left_zeros, right_zeros, left_poles = kept
-    change = float(np.exp(-min(nearest))) / OUTSIDE
+    change = float(np.exp(-min(nearest))) / reach
     return there, _joined(left_zeros, right_zeros, left_poles, fit.theta[-1]), change
 
 

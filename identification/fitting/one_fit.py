@@ -44,6 +44,8 @@ class OneFit:
         Of neighbouring normalised residuals; 0 within 1/sqrt(lines) when they are noise.
     distance
         Median of |test - plant|/|test|.
+    worst
+        Largest |test - plant| over its sigma.
     lines
         M, the number of frequencies.
     """
@@ -61,6 +63,7 @@ class OneFit:
     chi_square: float
     correlation: float
     distance: float
+    worst: float
     lines: int
 
     @property

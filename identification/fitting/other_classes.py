@@ -15,17 +15,19 @@ from identification.fitting.single_test_fit import ScaledTest
 from identification.model.structure import Structure, Wanted
 from identification.sweeps.response import FrequencyResponse, conjugated
 
-SUSPECT = 0.05  # median distance of a test from its own fit, above which another class is looked at
+SUSPECT = 0.03  # median distance of a test from its own fit, above which another class is looked at
+LIKELY = 0.1  # median distance of a conjugate that is taken
 ALIKE = 1.5  # times as far, that two plants fit alike
 BETTER = 3.0  # times nearer, as a class has to be that is taken for the right one
 RICHEST = Structure(0, 6, 6)  # that is looked at for unstable poles
+SIMPLER = tuple(Structure(0, n, n) for n in range(1, 5))
 
 
 def fits_reversed(tests: Sequence[FrequencyResponse], wanted: Wanted, distance: float, *, soft: bool) -> bool:
     """Whether the conjugate of the first test fits far better than the test itself, at a median ``distance``.
 
-    An unstable plant's response is not taken for a stable one's conjugate, unless both fit alike. Responses of raw
-    records are never reversed, and are not tried.
+    An unstable plant's response is not taken for a stable one's conjugate: an unstable plant must be neither nearer nor
+    as near and simpler. Responses of raw records are never reversed, and are not tried.
     """
     if distance < SUSPECT or any(test.record is not None for test in tests):
         return False
@@ -34,7 +36,20 @@ def fits_reversed(tests: Sequence[FrequencyResponse], wanted: Wanted, distance: 
     except InputError:
         return False
     found = result.tests[0].distance
-    return BETTER * found < distance and found < ALIKE * _with_unstable_poles(tests[0], result.structure)[0]
+    unstable, poles, structure = _with_unstable_poles(tests[0], result.structure)
+    simpler = result.structure.free <= structure.free or not poles.size
+    return BETTER * found < distance and found < LIKELY and found < ALIKE * unstable and simpler
+
+
+def has_outliers(test: FrequencyResponse, wanted: Wanted, distance: float) -> bool:
+    """Whether a fit that single lines hardly move is far nearer to most lines than least squares, at ``distance``."""
+    if distance < SUSPECT:
+        return False
+    try:
+        result = fit_plant([test], wanted, soft=True)
+    except InputError:
+        return False
+    return BETTER * result.tests[0].distance < distance
 
 
 def refuse_unstable(test: FrequencyResponse, structure: Structure | None, distance: float) -> None:
@@ -51,7 +66,7 @@ def refuse_unstable(test: FrequencyResponse, structure: Structure | None, distan
     """
     if distance < SUSPECT:
         return
-    found, poles = _with_unstable_poles(test, structure or RICHEST)
+    found, poles, _ = _with_unstable_poles(test, structure or RICHEST)
     if not (poles.size and BETTER * found < distance):
         return
     scaled = ScaledTest(grouped(test), soft=False)
@@ -63,11 +78,16 @@ def refuse_unstable(test: FrequencyResponse, structure: Structure | None, distan
         )
 
 
-def _with_unstable_poles(test: FrequencyResponse, structure: Structure) -> tuple[float, Complex]:
-    """How near a plant with poles on any side comes, as a median share, and its poles within the band on the right."""
+def _with_unstable_poles(test: FrequencyResponse, structure: Structure) -> tuple[float, Complex, Structure]:
+    """How near a plant with poles on any side comes, as a median share, its poles within the band on the right, and it.
+
+    It is the simplest of those that come about as near as any.
+    """
     scaled = ScaledTest(grouped(test), soft=False)
     response = scaled.lines.response
     sigma = np.asarray(np.sqrt(np.abs(response) ** 2 * scaled.lines.excitation))
-    tried = [unstable_poles(scaled.omega, response, sigma, each) for each in {structure, RICHEST}]
-    found, poles = min(tried, key=lambda each: each[0])
-    return found, poles[(np.abs(poles) > scaled.omega[0]) & (np.abs(poles) < scaled.omega[-1])] * scaled.centre
+    every = (*SIMPLER, structure, RICHEST)
+    tried = [(*unstable_poles(scaled.omega, response, sigma, each), each) for each in every]
+    nearest = min(found for found, _, _ in tried)
+    found, poles, which = next(each for each in tried if each[0] <= ALIKE * nearest)
+    return found, poles[(np.abs(poles) > scaled.omega[0]) & (np.abs(poles) < scaled.omega[-1])] * scaled.centre, which

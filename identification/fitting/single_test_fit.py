@@ -72,8 +72,7 @@ class ScaledTest:
         """First parameters and the errors' sigma to begin with, the most promising first; costly ones come late."""
         more: list[tuple[Real, Real]] = []
         if simpler is not None:
-            sigma = self._sigma(simpler)
-            more = [(theta, sigma) for theta in grown(simpler, self.omega, self._response(simpler), sigma, GROWN)]
+            more = [(theta, self._sigma(simpler)) for theta in self.grown_from(simpler)]
         response = self.lines.response if simpler is None else self._response(simpler)
         for floor in FIRST_FLOORS:
             sigma = np.asarray(np.sqrt((np.abs(response) ** 2 + floor**2) * self.lines.excitation))
@@ -81,6 +80,15 @@ class ScaledTest:
                 yield guess, sigma
                 if more:
                     yield more.pop(0)
+
+    def grown_from(self, simpler: Likely) -> list[Real]:
+        """First guesses with one more zero mode and pole mode, where most residual is."""
+        return grown(simpler, self.omega, self._response(simpler), self._sigma(simpler), GROWN)
+
+    def worst_run(self, likely: Likely) -> float:
+        """The largest median of three neighbouring residuals over their sigma."""
+        z = np.abs(self._residual(likely)) / self._sigma(likely)
+        return float(np.max(np.median(np.lib.stride_tricks.sliding_window_view(z, min(3, z.size)), axis=1)))
 
     def pursue(self, structure: Structure, starts: Iterable[Real], known: Likely, to_beat: float) -> Likely:
         """The likeliest fit from the most promising of ``starts``, with the errors of a fit that is known already."""
@@ -205,6 +213,7 @@ class ScaledTest:
             chi_square=float(np.mean(z)) / freedom,
             correlation=correlation,
             distance=distance,
+            worst=float(np.sqrt(np.max(z))),
             lines=self.omega.size,
         )
 
@@ -219,9 +228,16 @@ class ScaledTest:
         structure, sigma = likely.structure, self._sigma(likely)
         curvature = information(structure, likely.theta, self.omega, sigma)
         scale = 1 / np.sqrt(np.diag(curvature))
-        values, vectors = np.linalg.eigh(curvature * scale[:, None] * scale)
+        correlations = curvature * scale[:, None] * scale
+        if not (structure.delayed or np.linalg.eigvalsh(correlations)[0] > SINGULAR):
+            # what looks like a dead time is not asked for; by itself it would be as sure as this
+            correlations[-1, :-1] = correlations[:-1, -1] = 0.0
+        values, vectors = np.linalg.eigh(correlations)
         if not values[0] > SINGULAR:
-            raise Undetermined(f"{self.name}: the data do not determine {structure}; expected fewer or more lines")
+            raise Undetermined(
+                f"{self.name}: the data do not determine {structure}; expected other numbers of modes and real roots, "
+                "or lines where these show"
+            )
         units = np.append(np.ones(structure.size - 1), 1 / self.centre)
         weighted = vectors * (scale * units)[:, None]
         return np.asarray(spread * (weighted / values) @ weighted.T)

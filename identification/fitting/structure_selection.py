@@ -7,11 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.base.arrays import Real
 from identification.base.errors import InputError
 from identification.fitting.first_guess import BAND
 from identification.fitting.likelihood import Likely
 from identification.fitting.neighbouring_structures import (
     FLIPS,
+    GROWTH,
+    OUTSIDE,
     cancels_origin,
     has_needle,
     neighbours,
@@ -32,6 +35,9 @@ ALIKE = 6.0  # criteria closer than this are no strong evidence (Raftery, Sociol
 MATERIAL = 4.0  # times the median distance, that a root outside the band changes the response near its edge
 LITTLE = 0.25  # deviance a line
 AT_EDGE = 1.02  # times the end of the search
+RUN = 3.5  # times the noise, that two of three neighbouring lines are missed by chance once in 1e9
+HIDDEN = 30.0  # of the criterion: evidence for a pole or zero at s = 0 that roots below the band cancel
+LAST_RESORT = 1e12  # above every criterion
 HOPELESS = 20.0  # criterion lost on the first tests after which the others are not asked
 
 
@@ -94,9 +100,13 @@ class Selection:
         return best
 
     def _overdispersion(self, path: list[Structure]) -> float:
-        """Median of the path's small gains a test over that of a superfluous pair; 1 without several small gains."""
+        """Median of the path's small gains a test over that of a superfluous pair; 1 without several small gains.
+
+        They are those after the last large one: before it the plant itself is not found yet.
+        """
         gains = -np.diff([self._deviance(structure) for structure in path]) / len(self.tests)
-        small = gains[gains < LEVELLED * gains.max(initial=0.0)]
+        large = np.flatnonzero(gains >= LEVELLED * gains.max(initial=0.0))
+        small = gains[large[-1] + 1 :] if large.size else gains[:0]
         return max(1.0, float(np.median(small)) / SUPERFLUOUS) if small.size > 1 else 1.0
 
     def _climb(self, best: Structure) -> Structure:
@@ -107,7 +117,7 @@ class Selection:
         tried = {best}
         while True:
             better, is_white = best, self.white(best)
-            for step in neighbours(best):
+            for step in [*neighbours(best), *stepped(best, [] if is_white else [GROWTH])]:
                 if step in tried or not self._affordable(step) or not self.wanted.admits(step):
                     continue
                 if is_white and step.right > best.right:
@@ -122,7 +132,10 @@ class Selection:
             best = better
 
     def criterion(self, structure: Structure) -> float:
-        """Bayesian information criterion, summed over the tests; infinite for what is not admitted."""
+        """Bayesian information criterion, summed over the tests; infinite for what is not admitted.
+
+        It is at LAST_RESORT for what is taken only if there is nothing else.
+        """
         if not self.wanted.admits(structure):
             return np.inf
         return sum(map(self._criterion_of, range(len(self.tests)), self.fits[structure]))
@@ -133,7 +146,10 @@ class Selection:
     def white(self, structure: Structure) -> bool:
         """Whether a structure leaves nothing to explain in any test."""
         pairs = zip(self.tests, self.fits[structure], strict=True)
-        return all(test.exact(fit) or test.correlation(fit) < max(WHITE, test.chance) for test, fit in pairs)
+        return all(
+            test.exact(fit) or (test.correlation(fit) < max(WHITE, test.chance) and test.worst_run(fit) < RUN)
+            for test, fit in pairs
+        )
 
     def _path(self) -> list[Structure]:
         """Structures that grow by one zero mode and one pole mode at a time; those admitted are never none."""
@@ -205,21 +221,27 @@ class Selection:
         the search ends, change less than MATERIAL times what the model leaves at a line, and explain LITTLE. It counts
         as ``tried``.
         """
+        for reach in (BAND / AT_EDGE, OUTSIDE):
+            left = within_band(self.fits[here][0], self.tests[0].omega, reach)
+            if left is not None and self.wanted.admits(left[0]) and self._does_without(here, *left, tried):
+                return left[0]
+        return here
+
+    def _does_without(
+        self, here: Structure, there: Structure, start: Real, change: float, tried: set[Structure]
+    ) -> bool:
+        """Whether a structure does without the roots that ``there`` leaves out, from ``start``, see :meth:`_shed`."""
         first = self.tests[0]
-        left = within_band(self.fits[here][0], first.omega)
-        if left is None or not self.wanted.admits(left[0]):
-            return here
-        there = left[0]
         tried.add(there)
         if there not in self.fits:
-            fit = first.pursue(there, [left[1]], self.fits[here][0], np.inf)
+            fit = first.pursue(there, [start], self.fits[here][0], np.inf)
             self.fits[there] = [fit, *(test.follow(first, fit) for test in self.tests[1:])]
             self.tick()
         worse = self.criterion(there) - self.criterion(here)
         most = min(AT_EDGE / BAND, MATERIAL * first.distance(self.fits[here][0]))
         lines = sum(test.omega.size for test in self.tests)
-        immaterial = left[2] < most and self.overdispersion * worse < LITTLE * lines and not self.white(here)
-        return there if worse < ALIKE or immaterial else here
+        immaterial = change < most and self.overdispersion * worse < LITTLE * lines and not self.white(here)
+        return worse < ALIKE or immaterial
 
     def _mirrored(self, here: Structure) -> Structure:
         """The likeliest of a structure and of those in which one of its zeros is mirrored on the imaginary axis."""
@@ -238,7 +260,8 @@ class Selection:
         for i, (test, known) in enumerate(zip(self.tests, self.fits[here], strict=True)):
             penalty = self._penalty(i, there) - self._penalty(i, here)
             to_beat = known.deviance - self.overdispersion * (penalty - HOPELESS)
-            starts = reached_from(known, there, test.omega)
+            grows = there.poles > here.poles + 1
+            starts = test.grown_from(known) if grows else reached_from(known, there, test.omega)
             if not starts:
                 return False
             found = test.pursue(there, starts, known, to_beat)
@@ -251,11 +274,11 @@ class Selection:
         return True
 
     def _criterion_of(self, i: int, fit: Likely) -> float:
-        """The criterion of one test; infinite where a mode pair explains one line or no line shows what is at s = 0."""
+        """The criterion of one test: HIDDEN more where no line shows what is at s = 0; LAST_RESORT of needles."""
         omega = self.tests[i].omega
-        if has_needle(fit, omega) or (self.wanted.integrators is None and cancels_origin(fit, omega)):
-            return np.inf
-        return fit.deviance / self.overdispersion + self._penalty(i, fit.structure)
+        hidden = HIDDEN * (self.wanted.integrators is None and cancels_origin(fit, omega))
+        needle = LAST_RESORT * has_needle(fit, omega)
+        return fit.deviance / self.overdispersion + self._penalty(i, fit.structure) + hidden + needle
 
     def _deviance(self, structure: Structure) -> float:
         return sum(fit.deviance for fit in self.fits[structure])
