@@ -106,7 +106,7 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
         return np.asarray(np.exp(-1j * at * tau) / (-np.expm1(-1j * at * dt)) ** poles)
 
     tiles = _tiles(band, SHORTEST_WINDOW)
-    looks = tiles, _tiles(band, LONG_WINDOW)
+    looks = tiles, _tiles(band, min(LONG_WINDOW, band.size - 1))
     once, twice = (find_drift(difference, big_u * bend(omega, poles), big_y, looks, u.size) for poles in (1, 2))
     drift, poles = (twice, 2) if once.misfit - twice.misfit > SIGNIFICANT else (once, 1)
     bent = big_u * bend(omega, poles)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +15,6 @@ from identification.sweeps.usable_lines import FEWEST
 FEWEST_PERIODS = 1.5  # that are left when the beginning of a record is dropped
 HALVINGS = 8  # of the longest beginning that is dropped
 TOLD = 12  # complex degrees of freedom, at least, of which the noise at a harmonic is told
-DRIFTS = 0, 1, 2  # order of the polynomial: a ramp is what one integrator makes of a mean, a parabola what two do
 
 
 @dataclass(frozen=True)
@@ -65,11 +63,11 @@ def periodic_response(u: Real, y: Real, period: int, *, below: float) -> Harmoni
 
     Notes
     -----
-    Under a repeated input the output of integrators is periodic but for a polynomial of the time. Both are fitted
-    to the record by least squares, which is exact: the polynomial is what differs between samples of equal phase. What
-    the record's beginning adds decays, and a part of the record is dropped for it. The order of the polynomial and the
-    part are those with which the error that the scatter tells is least: a polynomial that is not there costs little
-    at the lowest harmonics alone, and one that is missing scatters.
+    Under a repeated input the output of up to two integrators is periodic but for a parabola in time. Both are fitted
+    to the record by least squares, which is exact: the parabola is what differs between samples of equal phase. It
+    costs little at the lowest harmonics alone, and the scatter would not tell a ramp: it moves whole periods. What the
+    record's beginning adds decays: the part of the record is dropped with which the error that the scatter tells is
+    least.
 
     References
     ----------
@@ -86,37 +84,32 @@ def periodic_response(u: Real, y: Real, period: int, *, below: float) -> Harmoni
         )
     longest = u.size - FEWEST_PERIODS * period
     starts = {0, *(int(longest / 2**k) for k in range(HALVINGS))}
-    looks = (look for start in sorted(starts) for look in _looks(u[start:], y[start:], period, number))
+    looks = (_look(u[start:], y[start:], period, number) for start in sorted(starts))
     return min(looks, key=lambda look: look.uncertainty)
 
 
-def _looks(u: Real, y: Real, period: int, number: Whole) -> Iterator[Harmonics]:
-    """The response at the harmonics ``number`` (K,) if the drift is a polynomial of each of the orders DRIFTS."""
+def _look(u: Real, y: Real, period: int, number: Whole) -> Harmonics:
+    """The response at the harmonics ``number`` (K,) if nothing of the record is dropped."""
     place = np.linspace(-1, 1, u.size)
-    drifts = [place**order for order in range(1, max(DRIFTS) + 1)]
-    means, rests = zip(*(_mean_and_rest(x, period) for x in (u, y, *drifts)), strict=True)
-    big_u, big_y, *big_drifts = (np.fft.rfft(mean)[number] for mean in means)
-    left_u, left_y, *left_drifts = (_periods(rest, period)[:, number] for rest in rests)
+    means, rests = zip(*(_mean_and_rest(x, period) for x in (u, y, place, place**2)), strict=True)
+    drift_rest, drift_mean = np.stack(rests[2:]), np.stack(means[2:])
+    covariance = np.linalg.inv(drift_rest @ drift_rest.T)  # over the variance of a sample
+    size = covariance @ (drift_rest @ rests[1])
+    big_u, big_y = (np.fft.rfft(x)[number] for x in (means[0], means[1] - size @ drift_mean))
+    response = big_y / big_u
+    left_u, left_y = (_periods(x, period)[:, number] for x in (rests[0], rests[1] - size @ drift_rest))
     freedom = u.size / period - 1
-    of_mean = np.mean(1 / np.bincount(np.arange(u.size) % period))
+    scatter = np.sum(np.abs(left_y - response * left_u) ** 2, axis=0) / freedom
     rounding = np.finfo(float).eps ** 2 * period * np.mean(y**2)
-    for order in DRIFTS:
-        columns = np.reshape(rests[2 : 2 + order], (order, u.size))
-        covariance = np.linalg.inv(columns @ columns.T)  # over the variance of a sample
-        size = covariance @ (columns @ rests[1])
-        drift = np.reshape(big_drifts[:order], (order, number.size))
-        response = (big_y - size @ drift) / big_u
-        left = left_y - response * left_u
-        for each, spectrum in zip(size, left_drifts, strict=False):
-            left = left - each * spectrum
-        scatter = np.sum(np.abs(left) ** 2, axis=0) / freedom
-        of_drift = np.einsum("ik,ij,jk->k", drift.conj(), covariance, drift).real / period
-        yield Harmonics(
-            number=number,
-            response=response,
-            gain=(of_mean + of_drift) / np.abs(big_u) ** 2,
-            noise=_running_mean(scatter, math.ceil(TOLD / freedom)) + rounding,
-        )
+    drift = np.fft.rfft(drift_mean, axis=1)[:, number]
+    of_drift = np.einsum("ik,ij,jk->k", drift.conj(), covariance, drift).real / period
+    of_mean = np.mean(1 / np.bincount(np.arange(u.size) % period))
+    return Harmonics(
+        number=number,
+        response=response,
+        gain=(of_mean + of_drift) / np.abs(big_u) ** 2,
+        noise=_running_mean(scatter, math.ceil(TOLD / freedom)) + rounding,
+    )
 
 
 def _mean_and_rest(x: Real, period: int) -> tuple[Real, Real]:

@@ -412,3 +412,11 @@ def test_a_repeated_input_of_few_harmonics_is_refused() -> None:
     u = np.tile(np.sin(2 * np.pi * np.arange(200) / 100) + np.sin(2 * np.pi * np.arange(200) / 40), 5)
     with pytest.raises(InputError, match="repeats itself every 200 samples and excites 2 harmonics of that; exp"):
         estimate_response(DT, u, np.roll(u, 3))
+
+
+def test_a_band_that_makes_no_long_window() -> None:
+    """Of 36 lines, no drift is told in windows of 45."""
+    u, plant = _multisine(2**13, 14.5, 19), PLANTS["no integrator, real pole"]
+    estimate = estimate_response(DT, u, held_response(plant, DT, u), held=True)
+    assert 9 <= estimate.omega.size <= 12
+    np.testing.assert_allclose(estimate.response, over_hold(plant, DT, estimate.omega), rtol=1e-2)
