@@ -101,8 +101,8 @@ def usable_lines(
     }
     left_out += tuple(LeftOut(omega[lines], response[lines], why) for why, lines in reasons.items() if lines.any())
     if kept.sum() < FEWEST:
-        why = f" ({'; '.join(map(str, left_out))})" if left_out else ""
-        raise InputError(f"{kept.sum()} spectral lines tell of the plant; expected {FEWEST} or more{why}")
+        why = "; ".join(map(str, left_out)) or "a longer record or a wider sweep"
+        raise InputError(f"{kept.sum()} spectral lines tell of the plant; expected {FEWEST} or more ({why})")
     return SweepEstimate(
         omega=omega[kept],
         response=response[kept],

@@ -13,6 +13,7 @@ from identification.model.plant import PlantModel
 from identification.model.pulse_response import aliases
 from identification.sweeps.estimate_response import SweepEstimate, estimate_response
 from identification.sweeps.excited_lines import period_of, whole_periods
+from identification.sweeps.usable_lines import usable_lines
 
 Real = NDArray[np.float64]
 DT = 1e-3
@@ -156,6 +157,8 @@ def test_a_repeated_input_is_recognised_and_a_narrow_sweep_is_not_one() -> None:
     cut, y, periods = whole_periods(u, u.copy(), 330)
     assert (periods, cut.size, y.size) == (12, 12 * 330 + 1, 12 * 330 + 1)
     np.testing.assert_array_equal(cut, u[-cut.size :])
+    fraction = np.sin(2 * np.pi * np.outer(np.arange(1, 30), np.arange(5000) / 300.5)).sum(axis=0)
+    assert abs(period_of(fraction, shortest=54) - 300.5) < 0.2
     narrow = _sweep(2**13, 50.0, 53.0)
     assert period_of(narrow, shortest=54) == narrow.size
     assert whole_periods(narrow, narrow, narrow.size)[2] == 1
@@ -373,7 +376,7 @@ def test_a_repeated_input_tells_the_response_at_each_of_its_harmonics(
 ) -> None:
     """From the first on, from rest, while integrators fly off: a ramp and a parabola are exact."""
     plant, step = PlantModel(24.0, (), (), 0.0, integrators, (), (30.0,)), 5e-3
-    u = _lines_of(kind, 7, 0.3 if integrators < 2 else 0.0)
+    u = _lines_of(kind, 7, 0.3)
     estimate = estimate_response(step, u, held_response(plant, step, u), held=True)
     number = estimate.omega * 200 * step / (2 * np.pi)
     assert round(number[0]) == first
@@ -420,3 +423,10 @@ def test_a_band_that_makes_no_long_window() -> None:
     estimate = estimate_response(DT, u, held_response(plant, DT, u), held=True)
     assert 9 <= estimate.omega.size <= 12
     np.testing.assert_allclose(estimate.response, over_hold(plant, DT, estimate.omega), rtol=1e-2)
+
+
+def test_a_refusal_gives_a_reason_where_no_line_was_left_out() -> None:
+    whole = np.full((2, 3), 1.0)
+    omega = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    with pytest.raises(InputError, match=r"^6 spectral lines tell .* 9 or more \(a longer record or a wider sweep\)$"):
+        usable_lines(omega, whole + 0j, 1e-6 * whole, 1e-6 * whole, np.ones(2))
