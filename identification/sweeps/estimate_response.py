@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from identification.base.arrays import Complex, Flags, Real, Whole
 from identification.base.errors import InputError
 from identification.model.pulse_response import hold
 from identification.sweeps.drift import find_drift
-from identification.sweeps.excited_lines import excited_band, whole_periods
+from identification.sweeps.excited_lines import excited_band, period_of, whole_periods
 from identification.sweeps.local_models import (
     COEFFICIENTS,
     RESOLVED,
@@ -23,8 +22,9 @@ from identification.sweeps.local_models import (
     mistaken,
     windows_of,
 )
+from identification.sweeps.periodic_response import periodic_response
 from identification.sweeps.response import LeftOut
-from identification.sweeps.usable_lines import usable_lines
+from identification.sweeps.usable_lines import SweepEstimate, usable_lines
 
 SHORTEST_WINDOW = COEFFICIENTS + 3  # three degrees of freedom left for the variance
 LONG_WINDOW = 5 * SHORTEST_WINDOW  # in which a drift is told from the response
@@ -35,35 +35,8 @@ BELOW_NYQUIST = 0.8  # of the Nyquist frequency: the part that analysers use; be
 TRUNCATED = 2.0  # F ratio of neighbouring windows together; noise alone gives 1.0 +- 0.3
 EVIDENT = 4.0  # the same, where a transient would cost most of what the windows say about the response
 MATERIAL = 1e-9  # of the output's power
-FEWEST = 9  # lines of a response: three windows
 END, STILL = 200, 0.01  # of the samples, at each end, and motion there over that of the record: it rests
 APART = 2.0  # variances with and without transient, where the two can be told apart
-
-
-@dataclass(frozen=True)
-class SweepEstimate:
-    """A response at M lines whose errors are independent; within a window that takes a pole they correlate by 0.3.
-
-    Parameters
-    ----------
-    omega
-        (M,) rad/s, increasing.
-    response
-        (M,) output unit per input unit.
-    variance
-        (M,) estimate of E|error|^2, from what the local models leave.
-    excitation
-        (M,) how the error's variance goes from line to line on account of the excitation alone: the variance is
-        this times the power density of the noise. Its median is 1.
-    left_out
-        Lines that say too little about the plant, see :func:`identification.sweeps.usable_lines.usable_lines`.
-    """
-
-    omega: Real
-    response: Complex
-    variance: Real
-    excitation: Real
-    left_out: tuple[LeftOut, ...]
 
 
 def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> SweepEstimate:
@@ -93,7 +66,9 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
 
     The response is given at the three zeros of the cubic orthogonal on the window's lines: there the errors of
     a quadratic fitted by least squares are uncorrelated, so that nothing of the record is lost, and the
-    cubic term leaves no bias. Windows do not overlap. An input that repeats itself is used at the lines of its period.
+    cubic term leaves no bias. Windows do not overlap. An input that repeats itself is used at the harmonics of its
+    period; where that is a whole number of samples, the response is the ratio of the spectra there, without windows:
+    :func:`identification.sweeps.periodic_response.periodic_response`.
 
     Under feedback the input answers the output's noise, too: where that is not small against what the reference does,
     the response errs towards the inverse of the controller.
@@ -104,14 +79,18 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
     """
     if np.ptp(y) == 0:
         raise InputError("the output never changes; expected the response to a sweep")
-    u, y, periods = whole_periods(u, y, shortest=6 * SHORTEST_WINDOW)
+    period = period_of(u, shortest=6 * SHORTEST_WINDOW)
+    if period.is_integer() and 2 * period <= u.size:
+        return _of_harmonics(dt, u, y, int(period), held=held)
+    u, y, periods = whole_periods(u, y, period)
     omega: Real = 2 * np.pi * periods * np.arange(1.0, (u.size - 1) // (2 * periods)) / ((u.size - 1) * dt)
     difference = -np.expm1(-1j * omega * dt)
     big_u, big_y = (
         np.fft.rfft(np.diff(x))[periods : periods * (omega.size + 1) : periods] / difference for x in (u, y)
     )
     band = excited_band(np.abs(big_u) ** 2, smoothing=2 * SHORTEST_WINDOW + 1)
-    # Nearer to zero than a window is wide no local model holds.
+    low = band[(band + 1 < SHORTEST_WINDOW) & (big_u[band] != 0)]  # no local model holds there
+    below = LeftOut(omega[low], big_y[low] / big_u[low], "nearer to zero than a window of lines is wide")
     band = band[(band + 1 >= SHORTEST_WINDOW) & (not held or omega[band] < BELOW_NYQUIST * np.pi / dt)]
     if band.size < 3 * SHORTEST_WINDOW:
         raise InputError(
@@ -127,7 +106,7 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
         return np.asarray(np.exp(-1j * at * tau) / (-np.expm1(-1j * at * dt)) ** poles)
 
     tiles = _tiles(band, SHORTEST_WINDOW)
-    looks = tiles, _tiles(band, LONG_WINDOW)
+    looks = tiles, _tiles(band, min(LONG_WINDOW, band.size - 1))
     once, twice = (find_drift(difference, big_u * bend(omega, poles), big_y, looks, u.size) for poles in (1, 2))
     drift, poles = (twice, 2) if once.misfit - twice.misfit > SIGNIFICANT else (once, 1)
     bent = big_u * bend(omega, poles)
@@ -145,17 +124,18 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
     factor = bend(at_nodes, poles) / (hold(at_nodes, dt) if held else 1.0)
     gain = (fit.gain + doubt / (fit.noise + RESOLVED * power + tiny)[:, None]) * np.abs(factor) ** 2
     response = fit.response * factor
-    usable, left_out = usable_lines(at_nodes, response, gain, rest.gain * np.abs(factor) ** 2, fit.noise)
-    if usable.sum() < FEWEST:
-        why = "; ".join(map(str, left_out))
-        raise InputError(f"{usable.sum()} spectral lines tell of the plant; expected {FEWEST} or more ({why})")
-    return SweepEstimate(
-        omega=at_nodes[usable],
-        response=response[usable],
-        variance=(gain * fit.noise[:, None])[usable],
-        excitation=(gain / np.median(gain[usable]))[usable],
-        left_out=left_out,
-    )
+    alone = rest.gain * np.abs(factor) ** 2
+    return usable_lines(at_nodes, response, gain, alone, fit.noise, (below,) if low.size else ())
+
+
+def _of_harmonics(dt: float, u: Real, y: Real, period: int, *, held: bool) -> SweepEstimate:
+    """The response at the harmonics of an input that is repeated every ``period`` samples."""
+    top = (BELOW_NYQUIST if held else 1.0) * period / 2
+    found = periodic_response(u, y, period, below=top)
+    omega = np.asarray(2 * np.pi / (period * dt) * found.number)
+    factor = hold(omega, dt) if held else np.ones(omega.size)
+    gain = (found.gain / np.abs(factor) ** 2)[:, None]
+    return usable_lines(omega[:, None], (found.response / factor)[:, None], gain, gain, found.noise)
 
 
 def _fit(groups: Sequence[Windows], y: Real, *, held: bool) -> tuple[LocalFit, LocalFit, Flags]:

@@ -5,27 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from identification.base.arrays import Real, Whole
+from identification.sweeps.local_models import SIGNIFICANT
 
 EXCITED = 1e-3  # of the typical power of the excited lines (-30 dB)
 PERIODIC = 0.95  # correlation with itself, periods later, of an input that is repeated
 
 
-def whole_periods(u: Real, y: Real, *, shortest: int) -> tuple[Real, Real, int]:
-    """Cut a record with a repeated input to whole periods.
+def period_of(u: Real, *, shortest: int) -> float:
+    """Samples in a period of the input ``u`` (N,), its size if it is not repeated.
 
-    Parameters
-    ----------
-    u, y
-        (N,) input and output.
-    shortest
-        Samples that a period has at least: half of them are its lines.
-
-    Returns
-    -------
-    tuple
-        The last whole periods of both channels and one sample before them, and the number of periods; the whole
-        record and 1 if the input is not repeated. A record of whole periods loses its first, in which the
-        plant settles.
+    The number is whole where a whole one is as near as the correlation tells, else what the correlation tells. A period
+    has ``shortest`` samples at least: half of them are its lines.
     """
     swing = u - np.mean(u)
     lag = np.arange(u.size // 2 + 1)
@@ -35,15 +25,51 @@ def whole_periods(u: Real, y: Real, *, shortest: int) -> tuple[Real, Real, int]:
     alike = products > PERIODIC * np.maximum(overlapping, energy[-1] / 4)
     late = max(u.size // 4, shortest)
     if not alike[late:].any():
-        return u, y, 1
+        return float(u.size)
     longest = late + int(np.argmax(products[late:] * alike[late:]))
     for count in range(longest // shortest, 0, -1):
         period = longest / count
         if alike[np.rint(period * np.arange(1, count + 1)).astype(int)].all():
             break
-    periods = int((u.size - 1) // period)
+    return float(round(period)) if abs(round(period) * count - longest) <= 1 else period
+
+
+def whole_periods(u: Real, y: Real, period: float) -> tuple[Real, Real, int]:
+    """The last whole periods of input and output, both (N,), one sample before them, and the number of periods.
+
+    A record of whole periods loses its first, in which the plant settles; one of a single period is left as it is.
+    """
+    periods = max(1, int((u.size - 1) // period))
     kept = round(periods * period) + 1
     return u[-kept:], y[-kept:], periods
+
+
+def excited_harmonics(power: Real, scatter: Real) -> Whole:
+    """Find the harmonics that a repeated input excites: all, odd ones, or any others.
+
+    Parameters
+    ----------
+    power, scatter
+        (L,) the mean's power at 0, 1, ... times the fundamental frequency, and the variance of the mean.
+
+    Returns
+    -------
+    Whole
+        (K,) numbers of the harmonics with a power of EXCITED and more of the typical one,
+        in the octave around them and in all. What is typical in all is that of evenly weighted harmonics or that of
+        harmonics weighted by their frequency, see :func:`excited_band`.
+    """
+    number = np.arange(1, power.size)
+    power, scatter = power[number], scatter[number]
+    total, square = (np.concatenate([[0.0], np.cumsum(power**exponent)]) for exponent in (1, 2))
+    first = np.ceil(number / np.sqrt(2)).astype(int) - 1
+    last = np.minimum(np.floor(number * np.sqrt(2)).astype(int), number.size)
+    here, among = square[last] - square[first], total[last] - total[first]
+    weak = power * among < EXCITED * here
+    enough = np.zeros(number.size, dtype=bool)
+    for weighted in (power, power * number):
+        enough |= weighted * np.sum(weighted) >= EXCITED * np.sum(weighted**2)
+    return np.asarray(number[enough & ~weak & (power > SIGNIFICANT * scatter)])
 
 
 def excited_band(power: Real, *, smoothing: int) -> Whole:

@@ -2,37 +2,73 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from identification.base.arrays import Complex, Flags, Real
+from identification.base.arrays import Complex, Real
+from identification.base.errors import InputError
 from identification.sweeps.local_models import TOGETHER, pooled
 from identification.sweeps.response import LeftOut
 
+FEWEST = 9  # lines of a response: three windows
 WEAKEST = 4.0  # a line whose variance is this much over that of others carries little and would widen a bound
 WORTH = 0.1  # error over response of a line that says something, however well the others are known
 DROWNED = 0.5  # error over response from which a band tells of the noise
 
 
+@dataclass(frozen=True)
+class SweepEstimate:
+    """A response at M lines whose errors are independent; within a window that takes a pole they correlate by 0.3.
+
+    Parameters
+    ----------
+    omega
+        (M,) rad/s, increasing.
+    response
+        (M,) output unit per input unit.
+    variance
+        (M,) estimate of E|error|^2, from what the local models leave, or from the scatter of periods.
+    excitation
+        (M,) how the error's variance goes from line to line on account of the excitation alone: the variance is
+        this times the power density of the noise. Its median is 1.
+    left_out
+        Lines that say too little about the plant, and why.
+    """
+
+    omega: Real
+    response: Complex
+    variance: Real
+    excitation: Real
+    left_out: tuple[LeftOut, ...]
+
+
 def usable_lines(
-    omega: Real, response: Complex, gain: Real, alone: Real, noise: Real
-) -> tuple[Flags, tuple[LeftOut, ...]]:
+    omega: Real, response: Complex, gain: Real, alone: Real, noise: Real, left_out: tuple[LeftOut, ...] = ()
+) -> SweepEstimate:
     """Tell the lines that carry information from those to leave out.
 
     Parameters
     ----------
     omega, response
-        (C, 3) the nodes of C windows, in rad/s, and the response there.
+        (C, n) the nodes of C windows, in rad/s, and the response there; or C harmonics, each a node.
     gain, alone
-        (C, 3) the variance of its error over the power density of the noise, as it is and as it were if the record
+        (C, n) the variance of its error over the power density of the noise, as it is and as it were if the record
         cut nothing off at its ends.
     noise
         (C,) power density of the noise in each window.
+    left_out
+        Other lines, which have been left out.
 
     Returns
     -------
-    tuple
-        (C, 3) the lines to keep, and those to leave out by the reason. Lines beyond the band that the input excites
-        are neither.
+    SweepEstimate
+        Of the lines to keep. Lines beyond the band that the input excites are neither kept nor left out.
+
+    Raises
+    ------
+    InputError
+        Fewer than FEWEST lines are to keep.
 
     Notes
     -----
@@ -46,12 +82,13 @@ def usable_lines(
     typical, excited = pooled(np.median(gain, axis=1)), pooled(np.median(alone, axis=1))
     power = pooled(np.mean(np.abs(response) ** 2, axis=1))
     relative = np.maximum(noise, pooled(noise))[:, None] * gain / np.where(power > 0, power, np.inf)[:, None]
-    octaves = np.log(omega[:, -1] / omega[:, 0])
+    centre = omega[:, omega.shape[1] // 2]
+    octaves = np.gradient(np.log(centre))
     first, last = _best_run(np.where(np.median(relative, axis=1) < DROWNED**2, octaves, -octaves))
     drowned = np.ones(omega.shape, dtype=bool)
     drowned[first:last] = False
     torn = np.broadcast_to((typical > WEAKEST * excited)[:, None], omega.shape)
-    weak = gain > WEAKEST * _around(omega[:, 1], np.median(gain, axis=1))[:, None]
+    weak = gain > WEAKEST * _around(centre, np.median(gain, axis=1))[:, None]
     if (rest := ~drowned & ~torn).any():
         little = max(WORTH**2, WEAKEST * float(np.median(relative[rest])))
         weak |= (gain > WEAKEST * np.median(gain[rest])) & (relative > little)
@@ -62,8 +99,17 @@ def usable_lines(
         "the response cannot be told there from what the record cuts off at its ends": torn & ~drowned & ~weak,
         "noise is more than half of the response": drowned & ~weak,
     }
-    left_out = (LeftOut(omega[lines], response[lines], why) for why, lines in reasons.items() if lines.any())
-    return kept, tuple(left_out)
+    left_out += tuple(LeftOut(omega[lines], response[lines], why) for why, lines in reasons.items() if lines.any())
+    if kept.sum() < FEWEST:
+        why = "; ".join(map(str, left_out)) or "a longer record or a wider sweep"
+        raise InputError(f"{kept.sum()} spectral lines tell of the plant; expected {FEWEST} or more ({why})")
+    return SweepEstimate(
+        omega=omega[kept],
+        response=response[kept],
+        variance=(gain * noise[:, None])[kept],
+        excitation=(gain / np.median(gain[kept]))[kept],
+        left_out=left_out,
+    )
 
 
 def _around(omega: Real, level: Real) -> Real:

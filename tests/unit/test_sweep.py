@@ -12,7 +12,8 @@ from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 from identification.model.pulse_response import aliases
 from identification.sweeps.estimate_response import SweepEstimate, estimate_response
-from identification.sweeps.excited_lines import whole_periods
+from identification.sweeps.excited_lines import period_of, whole_periods
+from identification.sweeps.usable_lines import usable_lines
 
 Real = NDArray[np.float64]
 DT = 1e-3
@@ -152,11 +153,15 @@ def test_a_repeated_input_is_recognised_and_a_narrow_sweep_is_not_one() -> None:
     """A sweep over a tenth of an octave is much like itself some cycles later, not a quarter of the record later."""
     period = np.random.default_rng(11).standard_normal(330)
     u = np.tile(period, 13)[:-100]
-    cut, y, periods = whole_periods(u, u.copy(), shortest=54)
+    assert period_of(u, shortest=54) == 330
+    cut, y, periods = whole_periods(u, u.copy(), 330)
     assert (periods, cut.size, y.size) == (12, 12 * 330 + 1, 12 * 330 + 1)
     np.testing.assert_array_equal(cut, u[-cut.size :])
+    fraction = np.sin(2 * np.pi * np.outer(np.arange(1, 30), np.arange(5000) / 300.5)).sum(axis=0)
+    assert abs(period_of(fraction, shortest=54) - 300.5) < 0.2
     narrow = _sweep(2**13, 50.0, 53.0)
-    assert whole_periods(narrow, narrow, shortest=54)[2] == 1
+    assert period_of(narrow, shortest=54) == narrow.size
+    assert whole_periods(narrow, narrow, narrow.size)[2] == 1
 
 
 def test_held_lines_end_below_the_nyquist_frequency() -> None:
@@ -349,3 +354,79 @@ def test_what_is_not_known_of_a_drift_is_in_the_variance() -> None:
         estimate = estimate_response(step, u, y + 1e-3 * np.std(y) * rng.standard_normal(y.size), held=True)
         error = np.abs(estimate.response - over_hold(plant, step, estimate.omega)) / np.sqrt(estimate.variance)
         assert np.mean(error[:12] ** 2) < 6
+
+
+def _lines_of(kind: str, periods: int, mean: float = 0.0) -> Real:
+    """A multisine of 200 samples a period: all of its harmonics up to 60, odd ones, or a random half; or pink ones."""
+    rng = np.random.default_rng(16)
+    number = np.arange(1, 61)
+    number = {"odd": number[::2], "random": number[rng.random(60) < 0.5]}.get(kind, number)
+    spectrum = np.zeros(101, dtype=complex)
+    spectrum[number] = np.exp(2j * np.pi * rng.random(number.size)) * (1 / number if kind == "pink" else 1.0)
+    u = np.fft.irfft(spectrum, 200)
+    return np.tile(mean + u / np.std(u), periods)
+
+
+@pytest.mark.parametrize(
+    ("kind", "first", "lines"), [("all", 1, 60), ("odd", 1, 30), ("random", 2, 0), ("pink", 1, 60)]
+)
+@pytest.mark.parametrize("integrators", [0, 1, 2])
+def test_a_repeated_input_tells_the_response_at_each_of_its_harmonics(
+    kind: str, first: int, lines: int, integrators: int
+) -> None:
+    """From the first on, from rest, while integrators fly off: a ramp and a parabola are exact."""
+    plant, step = PlantModel(24.0, (), (), 0.0, integrators, (), (30.0,)), 5e-3
+    u = _lines_of(kind, 7, 0.3)
+    estimate = estimate_response(step, u, held_response(plant, step, u), held=True)
+    number = estimate.omega * 200 * step / (2 * np.pi)
+    assert round(number[0]) == first
+    assert number.size == (lines or round(np.count_nonzero(np.abs(np.fft.rfft(u[:200]))[1:] > 1)))
+    np.testing.assert_allclose(number, np.rint(number), rtol=1e-12)
+    np.testing.assert_allclose(estimate.response, over_hold(plant, step, estimate.omega), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("periods", "of_input"), [(2, 0.0), (4, 0.0), (9, 0.03)])
+def test_the_scatter_of_the_periods_tells_the_error(periods: int, of_input: float) -> None:
+    """From rest, so that the beginning has a transient; with a noisy input, too. 40 records: a mean is known to 3 %."""
+    plant, step, rng = PlantModel(24.0, (), (), 0.0, 1, (), (30.0,)), 5e-3, np.random.default_rng(17)
+    u = _lines_of("pink", periods, 0.1)
+    y = held_response(plant, step, u)
+    ratios = []
+    for _ in range(40):
+        noise = 1e-3 * rng.standard_normal(u.size), of_input * rng.standard_normal(u.size)
+        estimate = estimate_response(step, u + noise[1], y + noise[0], held=True)
+        ratios.append(np.abs(estimate.response - over_hold(plant, step, estimate.omega)) ** 2 / estimate.variance)
+        assert estimate.omega.size > 10
+        assert estimate.omega[0] * 200 * step < 2 * np.pi * 1.01
+    assert 0.8 < np.mean(np.concatenate(ratios)) < 1.35
+    assert np.mean([ratio[:4] for ratio in ratios]) < 2
+
+
+def test_lines_below_the_first_window_are_named() -> None:
+    """A sweep from 0.1 Hz on, in 8 s: none of its lines up to 1 Hz makes a window."""
+    u = np.random.default_rng(18).standard_normal(2**13)
+    estimate = estimate_response(DT, u, held_response(PLANTS["no integrator, real pole"], DT, u), held=True)
+    assert "8 lines from 0.1221 to 0.9767 Hz left out: nearer to zero than a window of lines is wide" in str(
+        [str(lines) for lines in estimate.left_out]
+    )
+
+
+def test_a_repeated_input_of_few_harmonics_is_refused() -> None:
+    u = np.tile(np.sin(2 * np.pi * np.arange(200) / 100) + np.sin(2 * np.pi * np.arange(200) / 40), 5)
+    with pytest.raises(InputError, match="repeats itself every 200 samples and excites 2 harmonics of that; exp"):
+        estimate_response(DT, u, np.roll(u, 3))
+
+
+def test_a_band_that_makes_no_long_window() -> None:
+    """Of 36 lines, no drift is told in windows of 45."""
+    u, plant = _multisine(2**13, 14.5, 19), PLANTS["no integrator, real pole"]
+    estimate = estimate_response(DT, u, held_response(plant, DT, u), held=True)
+    assert 9 <= estimate.omega.size <= 12
+    np.testing.assert_allclose(estimate.response, over_hold(plant, DT, estimate.omega), rtol=1e-2)
+
+
+def test_a_refusal_gives_a_reason_where_no_line_was_left_out() -> None:
+    whole = np.full((2, 3), 1.0)
+    omega = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    with pytest.raises(InputError, match=r"^6 spectral lines tell .* 9 or more \(a longer record or a wider sweep\)$"):
+        usable_lines(omega, whole + 0j, 1e-6 * whole, 1e-6 * whole, np.ones(2))
