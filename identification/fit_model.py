@@ -21,6 +21,7 @@ from identification.model.reports import BoundReport, SubspaceCheck
 from identification.model.structure import INTEGRATORS, MOST_REAL, Wanted
 from identification.output.cautions import POOR
 from identification.output.fit_facts import fit_record, standard_errors
+from identification.sweeps.joined_bands import joined_bands
 from identification.sweeps.noise_lines import within, without_noise
 from identification.sweeps.response import FrequencyResponse, alias_free, conjugated
 
@@ -88,12 +89,16 @@ def fit_model(
 
     Notes
     -----
+    Tests of different bands are fitted as one, see :func:`identification.sweeps.joined_bands.joined_bands`.
     Where single lines spoil the fit by least squares, soft-L1 errors are taken; ``record.loss`` and a caution say so.
     Where the conjugate of all responses fits far better than they do, their phase has the other sign, as that of
     analysers that count a lag as positive, and the conjugate is fitted; ``record.conjugated`` says so.
     """
+    if not tests:
+        raise InputError("no test was given; expected one or more sweeps")
     within_band = without_noise(tests) if band is None else [within(test, *band) for test in tests]
-    used, result, reversed_from = _fit_either_sign(within_band, wanted or Wanted(), soft=soft, seed=seed, tick=tick)
+    chosen = joined_bands(within_band)
+    used, result, reversed_from = _fit_either_sign(chosen, wanted or Wanted(), soft=soft, seed=seed, tick=tick)
     plants = [test.plant for test in result.tests]
     checks = _checks(used, plants, tick)
     clean = tuple(alias_free(test, result.plant) for test in used)

@@ -21,7 +21,7 @@ POOR = 0.15  # median distance of a test from its own fit
 WORSE = 3.0  # times the distance of a test from its own fit
 AT_EDGE = 0.02  # of the search, a logarithm
 OUTLIER = 12.0  # times the noise, that a line is missed
-OPEN = 10.0  # ratio of the ends of an interval
+OPEN, UNKNOWN = 10.0, 1e6  # ratio of the ends of an interval
 
 
 def cautions(result: FitResult, tests: Sequence[FrequencyResponse], reversed_from: float | None = None) -> list[str]:
@@ -83,11 +83,13 @@ def _misfit(result: FitResult) -> Iterator[str]:
 def _edges(plant: PlantModel, omega: Real) -> dict[str, str]:
     """By a parameter's name, a sentence about each that is where the search ends or far from the lines."""
     low, high = float(omega.min()), float(omega.max())
-    said = {}
+    said, seen = {}, False
     for parameter in plant.parameters:
         size = abs(parameter.value)
+        if parameter.quantity == "omega":
+            seen = low <= size <= high
         if parameter.quantity == "zeta":
-            if size < LEAST_ZETA * (1 + AT_EDGE):
+            if size < LEAST_ZETA * (1 + AT_EDGE) and seen:
                 said[parameter.name] = (
                     f"{_name(parameter)} is {size:.3g}, the least that is sought: the resonance is narrower than the "
                     "lines lie apart, or undamped"
@@ -99,8 +101,8 @@ def _edges(plant: PlantModel, omega: Real) -> dict[str, str]:
             where = ", where the search ends" if abs(np.log(size / end)) < AT_EDGE else ""
             which = "lowest" if side == "below" else "highest"
             said[parameter.name] = (
-                f"{_name(parameter)} is {size:.4g} rad/s{where}, {side} all lines ({low:.4g} to {high:.4g} rad/s): it "
-                f"rests on what little it changes at the {which} of them, instead of {ideal}"
+                f"{_name(parameter)} is {parameter.value:.4g} rad/s{where}, {side} all lines ({low:.4g} to {high:.4g} "
+                f"rad/s): it rests on what little it changes at the {which} of them, instead of {ideal}"
             )
     return said
 
@@ -112,10 +114,9 @@ def _open(result: FitResult, edges: dict[str, str]) -> Iterator[str]:
     for parameter, low, high in zip(result.plant.parameters, lower, upper, strict=True):
         ends = sorted((abs(low), abs(high)))
         if parameter.kind != "delay_s" and parameter.name not in edges and ends[1] > OPEN * ends[0]:
-            yield (
-                f"{_name(parameter)}: the data leave it open between {low:.3g} and {high:.3g}, a factor of "
-                f"{ends[1] / ends[0]:.2g}"
-            )
+            known = ends[1] < UNKNOWN * ends[0]
+            how = f"leave it open between {low:.3g} and {high:.3g}" if known else "do not determine it"
+            yield f"{_name(parameter)}: the data {how}"
 
 
 def _dead_time(result: FitResult, tests: Sequence[FrequencyResponse]) -> Iterator[str]:

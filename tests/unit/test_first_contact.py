@@ -193,6 +193,40 @@ def test_an_unstable_plant_is_refused_by_name(rate: float) -> None:
         fit_model([test])
 
 
+@pytest.mark.parametrize("times", [10.0, -1.0])
+def test_an_outlier_is_named_and_hardly_counts(times: float) -> None:
+    omega = np.linspace(12.0, 1200.0, 150)
+    plant = PlantModel(40.0, (Mode(195.0, 0.03),), (Mode(340.0, 0.025),), 1.2e-3)
+    test = measured(plant, omega)
+    response = test.response.copy()
+    response[60] *= times
+    fitted = fit_model([replace(test, response=response)])
+    assert fitted.model.plant.integrators == 1
+    assert fitted.model.plant.gain == pytest.approx(40.0, rel=0.02)
+    assert not fitted.record.conjugated
+    if fitted.record.loss == "soft-L1":
+        hertz = f"{omega[60] / (2 * np.pi):.4g}"
+        assert any(f"the plant misses the line at {hertz} Hz by" in caution for caution in fitted.record.cautions)
+
+
+def test_tests_of_different_bands_are_of_one_plant() -> None:
+    plant = PlantModel(40.0, (Mode(195.0, 0.03),), (Mode(340.0, 0.025),), 1.2e-3)
+    bands = [np.geomspace(3.0, 120.0, 40), np.linspace(60.0, 630.0, 91), np.linspace(380.0, 1900.0, 121)]
+    tests = [measured(plant, omega, seed=k, name=str(k)) for k, omega in enumerate(bands)]
+    found = fit_model(tests).model.plant
+    assert found.integrators == 1
+    assert found.gain == pytest.approx(40.0, rel=0.02)
+    assert [mode.omega for mode in found.pole_modes] == [pytest.approx(340.0, rel=0.01)]
+
+
+def test_what_is_asked_for_is_never_dropped() -> None:
+    """Modes that the data do not ask for: the plant has them all the same."""
+    plant = PlantModel(0.7, (), (Mode(660.0, 0.6),), 2e-4, 0)
+    test = measured(plant, 2 * np.pi * np.geomspace(1.0, 1000.0, 50))
+    found = fit_plant([test], Wanted(modes=(1, 2))).plant
+    assert (len(found.zero_modes), len(found.pole_modes)) == (1, 2)
+
+
 # the band
 
 
