@@ -96,7 +96,7 @@ def paragraphs(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> tu
     """
     fit = fitted(model)
     return (
-        ("Tests", _tests(tests, fit)),
+        ("Tests", _tests(tests)),
         ("Structure", _structure(fit)),
         ("Intervals", _intervals(fit)),
         ("Residuals", _residuals(fit)),
@@ -126,14 +126,14 @@ def _few(names: Sequence[str]) -> str:
     return ", ".join(names if len(names) <= MOST_NAMES else [*names[:2], "...", names[-1]])
 
 
-def _tests(tests: Sequence[FrequencyResponse], fit: FitRecord) -> str:
+def _tests(tests: Sequence[FrequencyResponse]) -> str:
     counts = Counter(printable(test.path.name) if test.path else test.name for test in tests)
     files = [name if count in (1, len(tests)) else f"{name} ({count} tests)" for name, count in counts.items()]
     low, high = min(test.omega[0] for test in tests), max(test.omega[-1] for test in tests)
     rest = [lines for test in tests for lines in test.left_out]
     reasons = "; ".join(dict.fromkeys(lines.reason for lines in rest))
     left_out = f" {sum(lines.omega.size for lines in rest)} lines are left out ({reasons})." if rest else ""
-    remarks = "; ".join(dict.fromkeys(said for test in fit.tests for said in test.remarks))
+    remarks = "; ".join(dict.fromkeys(said for test in tests for said in test.remarks))
     as_read = f" As read: {remarks}." if remarks else ""
     return (
         f"{len(tests)} test{'s' if len(tests) > 1 else ''} in {_few(files)}; "
