@@ -86,6 +86,7 @@ def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
 def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
     """Draw SWEEP files, MODEL and the distances under W_a: bode.pdf, .svg and .png, with a caption in bode.txt."""
     from identification.model.model_file import read_model
+    from identification.sweeps.as_fitted import as_fitted
     from identification.sweeps.read_sweeps import read_sweeps
     from paper_figures.look.bode import plot_bode
     from paper_figures.look.style import rendered, write
@@ -94,6 +95,11 @@ def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
     identified, tests = read_model(model), read_sweeps(sweeps)
     names = ", ".join(test.name + (" (synthetic)" if test.synthetic else "") for test in tests)
     caption = f"Magnitude and phase of {names} and of the model {model.name}, and their distance under the bound W_a."
+    used = as_fitted(identified, tests)
+    if any(test.left_out for test in used):
+        caption += " Lines that the fit left out are in another colour."
+    if any(test.conjugated for test in used):
+        caption += " The sign of the phase is reversed, as in the fit."
     with sentences_of({}, output, "bode", model):
         files = rendered(plot_bode(identified, tests), output, "bode", caption)
     write(files)

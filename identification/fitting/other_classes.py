@@ -19,6 +19,7 @@ SUSPECT = 0.03  # median distance of a test from its own fit, above which anothe
 NUMBERS = 3  # that a test has for each parameter, at least
 LIKELY = 0.1  # median distance of a conjugate that is taken
 ALIKE = 1.5  # times as far, that two plants fit alike
+ROBUST = 1.5  # times nearer, as a fit has to be that outliers hardly move
 BETTER = 3.0  # times nearer, as a class has to be that is taken for the right one
 RICHEST = Structure(0, 6, 6)  # that is looked at for unstable poles
 SIMPLER = tuple(Structure(0, zeros, n) for n in range(5) for zeros in sorted({0, n}))
@@ -41,8 +42,9 @@ def fits_reversed(tests: Sequence[FrequencyResponse], wanted: Wanted, distance: 
     found = result.tests[0].distance
     unstable, poles, structure = _with_unstable_poles(tests[0], result.structure)
     _, its_poles, its_structure = _with_unstable_poles(conjugated(tests[0]), result.structure)
-    simpler = not poles.size or (not its_poles.size and its_structure.free <= structure.free)
-    return BETTER * found < distance and found < LIKELY and found < ALIKE * unstable and simpler
+    simpler = not its_poles.size and its_structure.free <= structure.free
+    is_stable = not poles.size or ALIKE * found < unstable or (found < ALIKE * unstable and simpler)
+    return BETTER * found < distance and found < LIKELY and is_stable
 
 
 def has_outliers(test: FrequencyResponse, wanted: Wanted, distance: float) -> bool:
@@ -53,7 +55,7 @@ def has_outliers(test: FrequencyResponse, wanted: Wanted, distance: float) -> bo
         result = fit_plant([test], wanted, soft=True)
     except InputError:
         return False
-    return BETTER * result.tests[0].distance < distance
+    return ROBUST * result.tests[0].distance < distance
 
 
 def refuse_unstable(test: FrequencyResponse, structure: Structure | None, distance: float) -> None:

@@ -93,6 +93,8 @@ class FittedTest:
         Lines that were not used, in sentences.
     remarks
         What was left out or changed while the test was read.
+    conjugated
+        Whether the sign of its phase was reversed.
     """
 
     name: str
@@ -108,6 +110,7 @@ class FittedTest:
     band: tuple[float, float]
     left_out: tuple[str, ...]
     remarks: tuple[str, ...]
+    conjugated: bool
 
     def to_dict(self) -> dict[str, Any]:
         """An entry of ``tests``."""
@@ -143,7 +146,7 @@ class FitRecord:
     source, method, loss
         In words.
     conjugated
-        Whether the sign of the tests' phase was reversed.
+        Whether the sign of any test's phase was reversed.
     synthetic
         Whether any of the tests was never measured.
     structure

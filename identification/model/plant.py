@@ -119,8 +119,8 @@ class PlantModel:
     def from_control(cls, system: object, delay_s: float = 0.0, integrators: int | None = None) -> PlantModel:
         """The plant of a python-control system and a dead time in seconds.
 
-        ``integrators`` says how many of the slowest poles are at s = 0; unless given, those that are there exactly.
-        Zeros at s = 0 are those that are there exactly.
+        ``integrators`` says how many of the slowest poles are at s = 0, or, negative, how many of the slowest zeros;
+        unless given, those that are there exactly.
 
         Raises
         ------
@@ -129,15 +129,17 @@ class PlantModel:
             root lies on it but not at s = 0; or rounding hides whether a pole is at s = 0, see :data:`NEAR_ZERO`.
         """
         gain, every, found = from_control(system)
-        zeros = [zero for zero in every if zero]
-        poles = sorted(found, key=abs)
-        count = sum(not pole for pole in poles) if integrators is None else integrators
-        left = poles[count:]
-        if integrators is None and left and abs(left[0]) < NEAR_ZERO * max(map(abs, (*poles, *zeros))):
-            raise InputError(
-                f"a pole is at {left[0]:.3g} rad/s, which rounding does not tell from 0; expected integrators to say "
-                "how many there are"
-            )
+        zeros, poles = sorted(every, key=abs), sorted(found, key=abs)
+        at_zero = sum(not zero for zero in zeros) if integrators is None else max(0, -integrators)
+        count = sum(not pole for pole in poles) if integrators is None else max(0, integrators)
+        largest = max(map(abs, (*poles, *zeros)), default=0.0)
+        zeros, left = zeros[at_zero:], poles[count:]
+        for kind, roots in (("pole", left), ("zero", zeros)):
+            if integrators is None and roots and abs(roots[0]) < NEAR_ZERO * largest:
+                raise InputError(
+                    f"a {kind} is at {roots[0]:.3g} rad/s, which rounding does not tell from 0; expected integrators "
+                    "to say how many there are"
+                )
         (zero_modes, real_zeros), (pole_modes, real_poles) = factors_of(zeros), factors_of(left)
-        count -= len(every) - len(zeros)
+        count -= at_zero
         return cls(lowest(gain, zeros, left), zero_modes, pole_modes, delay_s, count, real_zeros, real_poles)

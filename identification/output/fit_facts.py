@@ -85,6 +85,7 @@ def _test_record(test: FrequencyResponse, fit: OneFit) -> FittedTest:
         band=(float(test.omega[0]), float(test.omega[-1])),
         left_out=tuple(map(str, test.left_out)),
         remarks=test.remarks,
+        conjugated=test.conjugated,
     )
 
 

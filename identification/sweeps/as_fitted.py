@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from identification.model.model_file import IdentifiedModel
+from identification.sweeps.joined_bands import joined
 from identification.sweeps.noise_lines import only
 from identification.sweeps.response import FrequencyResponse, alias_free, conjugated
 
@@ -21,13 +20,14 @@ def as_fitted(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> lis
     tests
         As they are read, or as they were kept.
     """
-    bands = {} if model.fit is None else {test.name: test.band for test in model.fit.tests}
+    fitted = {} if model.fit is None else {test.name: test for test in model.fit.tests}
+    together = joined(tests)
     found = []
-    for test in tests:
+    for test in [together] if together.name in fitted else tests:
         used = alias_free(test, model.plant)
-        if model.fit is not None and model.fit.conjugated and not used.conjugated:
-            used = conjugated(used)
-        low, high = bands.get(used.name, (0.0, np.inf))
-        kept = (used.omega >= low) & (used.omega <= high)
-        found.append(only(used, kept, "not used by the fit") if kept.any() else used)
+        if (own := fitted.get(used.name)) is not None:
+            used = conjugated(used) if own.conjugated != used.conjugated else used
+            kept = (used.omega >= own.band[0]) & (used.omega <= own.band[1])
+            used = only(used, kept, "not used by the fit") if kept.any() else used
+        found.append(used)
     return found

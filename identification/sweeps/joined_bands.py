@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,25 +22,32 @@ def joined_bands(tests: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
     alike = all(np.log(test.omega[-1] / test.omega[0]) > SHARE * np.log(high / low) for test in tests)
     if alike or any(test.record is not None and test.record.held for test in tests):
         return list(tests)
+    return [joined(tests)]
+
+
+def joined(tests: Sequence[FrequencyResponse]) -> FrequencyResponse:
+    """All lines of one or more tests as one test, which has the names of all; one alone is left as it is."""
+    if len(tests) == 1:
+        return tests[0]
     omega = np.concatenate([test.omega for test in tests])
     order = np.argsort(omega, kind="stable")
     omega = omega[order]
     for again in np.flatnonzero(np.diff(omega) <= APART * omega[:-1]) + 1:
         omega[again] = omega[again - 1] * (1 + APART)
     excitations = [np.ones_like(test.omega) if test.excitation is None else test.excitation for test in tests]
-    return [
-        FrequencyResponse(
-            omega=omega,
-            response=np.concatenate([test.response for test in tests])[order],
-            coherence=None,
-            name=" and ".join(test.name for test in tests),
-            excitation=np.concatenate(excitations)[order],
-            synthetic=any(test.synthetic for test in tests),
-            left_out=tuple(lines for test in tests for lines in test.left_out),
-            remarks=(
-                *(f"{test.name}: {said}" for test in tests for said in test.remarks),
-                f"{len(tests)} tests of different bands are fitted together: how tests scatter is not known",
-            ),
-            conjugated=any(test.conjugated for test in tests),
-        )
-    ]
+    return FrequencyResponse(
+        omega=omega,
+        response=np.concatenate([test.response for test in tests])[order],
+        coherence=None,
+        name=" and ".join(test.name for test in tests),
+        excitation=np.concatenate(excitations)[order],
+        synthetic=any(test.synthetic for test in tests),
+        left_out=tuple(
+            replace(lines, reason=f"{lines.reason} ({test.name})") for test in tests for lines in test.left_out
+        ),
+        remarks=(
+            *(f"{test.name}: {said}" for test in tests for said in test.remarks),
+            f"{len(tests)} tests of different bands are fitted together: how tests scatter is not known",
+        ),
+        conjugated=all(test.conjugated for test in tests),
+    )

@@ -124,12 +124,15 @@ def only(test: FrequencyResponse, kept: Flags, reason: str) -> FrequencyResponse
     """The test's lines where ``kept`` (M,) holds, which are some; the others are left out for the ``reason``."""
     if kept.all():
         return test
-    rest = LeftOut(test.omega[~kept], test.response[~kept], reason)
+    first, last = np.flatnonzero(kept)[[0, -1]]
+    place = np.arange(kept.size)
+    parts = [~kept & side for side in (place < first, (place > first) & (place < last), place > last)]
+    rest = [LeftOut(test.omega[part], test.response[part], reason) for part in parts if part.any()]
     return replace(
         test,
         omega=test.omega[kept],
         response=test.response[kept],
         coherence=None if test.coherence is None else test.coherence[kept],
         excitation=None if test.excitation is None else test.excitation[kept],
-        left_out=(*test.left_out, rest),
+        left_out=(*test.left_out, *rest),
     )

@@ -109,7 +109,7 @@ def paragraphs(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> tu
 def fitted(model: IdentifiedModel) -> FitRecord:
     """How a model was fitted; raises InputError if it does not say."""
     if model.fit is None:
-        raise InputError("the fit says nothing of tests; expected a model that was fitted to sweeps")
+        raise InputError("the model holds no fit that this version reads; expected one that it fitted to sweeps")
     return model.fit
 
 

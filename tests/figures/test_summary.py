@@ -103,6 +103,7 @@ def record_of(plant: PlantModel, tests: list[FrequencyResponse], bound: Additive
                 band=(float(test.omega[0]), float(test.omega[-1])),
                 left_out=(),
                 remarks=(),
+                conjugated=False,
             )
             for test in tests
         ),
@@ -335,7 +336,7 @@ def test_model_of_other_tests_or_of_none_is_refused():
     tests = sweeps_of(plant, 2)
     with pytest.raises(InputError, match=r"fitted to day_0.csv, day_1.csv; expected these sweeps"):
         summarise(model_of(plant, tests), tests[:1], {}, {})
-    with pytest.raises(InputError, match="says nothing of tests; expected a model that was fitted to sweeps"):
+    with pytest.raises(InputError, match="holds no fit that this version reads; expected one that it fitted to sweeps"):
         summarise(model_named("implied"), tests, {}, {})
 
 

@@ -371,3 +371,37 @@ def test_tests_of_different_plants_are_not_cut_as_noise() -> None:
     plants = [replace(PAIR, gain=gain, delay_s=delay) for gain, delay in ((0.1, 1e-3), (1.0, 9e-3), (4.0, 20e-3))]
     kept = without_noise([measured(plant, name=str(plant.gain)) for plant in plants])
     assert all(not test.left_out for test in kept)
+
+
+def test_a_reversal_is_kept_for_each_test() -> None:
+    """A test that a fit turned and one that it did not, fitted together: each is compared as it was used."""
+    turned = fit_model([replace(measured(PAIR), response=measured(PAIR).response.conj(), name="turned")]).tests[0]
+    tests = [turned, measured(PAIR, seed=1, name="right")]
+    compared = as_fitted(fit_model(tests).model, tests)
+    for test, used in zip(tests, compared, strict=True):
+        np.testing.assert_array_equal(used.response, test.response)
+
+
+def test_sweeps_of_a_joined_fit_are_joined_again() -> None:
+    bands = [np.geomspace(3.0, 160.0, 60), np.geomspace(100.0, 500.0, 60)]
+    tests = [measured(PAIR, omega, seed=k, name=str(k)) for k, omega in enumerate(bands)]
+    fitted = fit_model(tests)
+    (used,) = as_fitted(fitted.model, tests)
+    assert used.name == fitted.tests[0].name == "0 and 1"
+    np.testing.assert_array_equal(used.response, fitted.tests[0].response)
+
+
+def test_lines_left_out_are_named_side_by_side() -> None:
+    sentences = [str(lines) for lines in within(measured(PAIR), 1.0, 50.0).left_out]
+    assert [sentence.split(" left")[0] for sentence in sentences] == [
+        "4 lines from 0.2 to 0.8 Hz",
+        "150 lines from 50.2 to 80 Hz",
+    ]
+
+
+def test_a_plain_reversal_is_found_beside_a_simple_unstable_plant() -> None:
+    plant = PlantModel(7.0, (Mode(180.0, 0.03), Mode(600.0, 0.05)), (Mode(280.0, 0.02), Mode(750.0, 0.05)), 8e-3)
+    test = measured(plant, 2 * np.pi * np.geomspace(0.3, 160.0, 250))
+    fitted = fit_model([replace(test, response=test.response.conj())])
+    assert fitted.record.conjugated
+    assert fitted.model.plant.gain == pytest.approx(7.0, rel=0.01)

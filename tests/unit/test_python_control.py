@@ -106,3 +106,13 @@ def test_a_run_is_a_time_response(extended_design: Design) -> None:
     np.testing.assert_array_equal(response.outputs[response.output_labels.index("output")], run.outputs["output"])
     np.testing.assert_array_equal(response.inputs[0], run.saturated_control)
     np.testing.assert_array_equal(response.time, run.time_s)
+
+
+def test_zeros_at_the_origin_come_back_from_a_state_space() -> None:
+    """Rounding moves a double zero off s = 0; it is said, and the number of zeros can be given."""
+    plant = PlantModel(1e-3, (), (Mode(200.0, 0.03),), 0.0, -2)
+    system = control.ss(plant.to_control())
+    back = PlantModel.from_control(system, integrators=-2)
+    assert back.integrators == -2
+    s = 1j * np.geomspace(1.0, 1e3, 20)
+    np.testing.assert_allclose(back(s), plant(s), rtol=1e-6)
