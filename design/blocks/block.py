@@ -179,8 +179,8 @@ def require_thesis_class(plant: PlantModel, excess: int = 0) -> None:
         or too many poles.
     """
     if plant.integrators != 1:
-        zeros = "a zero" if plant.integrators == -1 else f"{-plant.integrators} zeros"
-        found = f"{plant.integrators} integrators" if plant.integrators >= 0 else f"{zeros} at s = 0"
+        at_zero = "a zero" if plant.integrators == -1 else f"{-plant.integrators} zeros"
+        found = f"{plant.integrators} integrators" if plant.integrators >= 0 else f"{at_zero} at s = 0"
         raise InputError(
             f"the plant has {found}; the design expects exactly one integrator, Eq. (2.20): Lemma 1, (3.2) and (3.16) "
             "are for one"
