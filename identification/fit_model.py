@@ -122,8 +122,12 @@ def _fit_either_sign(
     except (Misfit, Undetermined) as error:
         refusal = error
     if not soft and (stands_out or distance > POOR) and has_outliers(tests[0], wanted, distance):
-        return _fit_either_sign(tests, wanted, soft=True, seed=seed, tick=tick)
-    if fits_reversed(tests, wanted, distance, soft=soft):
+        used, robust, before = _fit_either_sign(tests, wanted, soft=True, seed=seed, tick=tick)
+        if before is None:
+            return used, robust, None
+        # the sign was what least squares missed: with the other one they are tried again
+        return used, _fit_either_sign(used, wanted, soft=False, seed=seed, tick=tick)[1], before
+    if fits_reversed(tests, wanted, distance, np.inf if result is None else result.tests[0].deviance, soft=soft):
         turned = [conjugated(test) for test in tests]
         return turned, fit_plant(turned, wanted, soft=soft, seed=seed, tick=tick), distance
     refuse_unstable(tests[0], None if result is None else result.structure, distance)

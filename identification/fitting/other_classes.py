@@ -15,25 +15,30 @@ from identification.fitting.single_test_fit import ScaledTest
 from identification.model.structure import Structure, Wanted
 from identification.sweeps.response import FrequencyResponse, conjugated
 
-SUSPECT = 0.03  # median distance of a test from its own fit, above which another class is looked at
+SUSPECT = 0.02  # median distance of a test from its own fit, above which another class is looked at
 NUMBERS = 3  # that a test has for each parameter, at least
 LIKELY = 0.1  # median distance of a conjugate that is taken
 ALIKE = 1.5  # times as far, that two plants fit alike
+DECISIVE = 1.0  # deviance a line
 ROBUST = 1.5  # times nearer, as a fit has to be that outliers hardly move
 BETTER = 3.0  # times nearer, as a class has to be that is taken for the right one
 RICHEST = Structure(0, 6, 6)  # that is looked at for unstable poles
 SIMPLER = tuple(Structure(0, zeros, n) for n in range(5) for zeros in sorted({0, n}))
 
 
-def fits_reversed(tests: Sequence[FrequencyResponse], wanted: Wanted, distance: float, *, soft: bool) -> bool:
+def fits_reversed(
+    tests: Sequence[FrequencyResponse], wanted: Wanted, distance: float, deviance: float, *, soft: bool
+) -> bool:
     """Whether the conjugate of the first test fits far better than the test itself, at a median ``distance``.
+
+    Far better is BETTER times nearer, or nearer and likelier by a deviance of DECISIVE a line than the test's own.
 
     An unstable plant's response is not taken for a stable one's conjugate: an unstable plant must be neither nearer nor
     as near and simpler. Responses of raw records are never reversed, and are not tried.
     """
     if distance < SUSPECT or any(test.record is not None for test in tests):
         return False
-    if BETTER * _with_unstable_poles(conjugated(tests[0]), RICHEST)[0] > ALIKE * distance:
+    if _with_unstable_poles(conjugated(tests[0]), RICHEST)[0] > distance:
         return False
     try:
         result = fit_plant([conjugated(tests[0])], wanted, soft=soft)
@@ -44,7 +49,9 @@ def fits_reversed(tests: Sequence[FrequencyResponse], wanted: Wanted, distance: 
     _, its_poles, its_structure = _with_unstable_poles(conjugated(tests[0]), result.structure)
     simpler = not its_poles.size and its_structure.free <= structure.free
     is_stable = not poles.size or ALIKE * found < unstable or (found < ALIKE * unstable and simpler)
-    return BETTER * found < distance and found < LIKELY and is_stable
+    likelier = result.tests[0].deviance + DECISIVE * result.tests[0].lines < deviance
+    is_nearer = BETTER * found < distance or (found < distance and likelier)
+    return is_nearer and found < LIKELY and is_stable
 
 
 def has_outliers(test: FrequencyResponse, wanted: Wanted, distance: float) -> bool:

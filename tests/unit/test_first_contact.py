@@ -28,6 +28,7 @@ from identification.sweeps.response import FrequencyResponse
 
 PAIR = PlantModel(0.5, (Mode(120.0, 0.02),), (Mode(200.0, 0.03),), 8e-3)
 OMEGA = 2 * np.pi * np.arange(0.2, 80.1, 0.2)
+FEWER = OMEGA[3::4]
 
 
 def measured(
@@ -168,7 +169,7 @@ def test_structures_that_the_data_hardly_tell_apart_are_named() -> None:
 
 
 def test_a_reversed_phase_is_named_and_undone() -> None:
-    tests = [measured(PAIR, seed=k, name=f"day {k}") for k in range(2)]
+    tests = [measured(PAIR, FEWER, seed=k, name=f"day {k}") for k in range(2)]
     reversed_tests = [replace(test, response=test.response.conj()) for test in tests]
     fitted = fit_model(reversed_tests)
     assert fitted.model.plant == fit_model(tests).model.plant
@@ -184,7 +185,7 @@ def test_a_phase_as_it_should_be_is_left() -> None:
 @pytest.mark.parametrize("rate", [30.0, 90.0])
 def test_an_unstable_plant_is_refused_by_name(rate: float) -> None:
     """K/(1 - s/a): a stable plant's phase falls where this one's rises."""
-    omega = np.geomspace(5.0, 500.0, 120)
+    omega = np.geomspace(5.0, 500.0, 60)
     stable = measured(PlantModel(2.0, (), (Mode(200.0, 0.05),), 4e-3, 0), omega)
     test = replace(stable, response=stable.response / (1 - 1j * omega / rate))
     with pytest.raises(
@@ -375,8 +376,9 @@ def test_tests_of_different_plants_are_not_cut_as_noise() -> None:
 
 def test_a_reversal_is_kept_for_each_test() -> None:
     """A test that a fit turned and one that it did not, fitted together: each is compared as it was used."""
-    turned = fit_model([replace(measured(PAIR), response=measured(PAIR).response.conj(), name="turned")]).tests[0]
-    tests = [turned, measured(PAIR, seed=1, name="right")]
+    right = measured(PAIR, FEWER, seed=1, name="right")
+    turned = fit_model([replace(right, response=right.response.conj(), name="turned")]).tests[0]
+    tests = [turned, right]
     compared = as_fitted(fit_model(tests).model, tests)
     for test, used in zip(tests, compared, strict=True):
         np.testing.assert_array_equal(used.response, test.response)
@@ -401,7 +403,7 @@ def test_lines_left_out_are_named_side_by_side() -> None:
 
 def test_a_plain_reversal_is_found_beside_a_simple_unstable_plant() -> None:
     plant = PlantModel(7.0, (Mode(180.0, 0.03), Mode(600.0, 0.05)), (Mode(280.0, 0.02), Mode(750.0, 0.05)), 8e-3)
-    test = measured(plant, 2 * np.pi * np.geomspace(0.3, 160.0, 250))
+    test = measured(plant, 2 * np.pi * np.geomspace(0.3, 160.0, 160))
     fitted = fit_model([replace(test, response=test.response.conj())])
     assert fitted.record.conjugated
     assert fitted.model.plant.gain == pytest.approx(7.0, rel=0.01)
