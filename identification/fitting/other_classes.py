@@ -19,6 +19,7 @@ SUSPECT = 0.02  # median distance of a test from its own fit, above which anothe
 NUMBERS = 3  # that a test has for each parameter, at least
 LIKELY = 0.1  # median distance of a conjugate that is taken
 ALIKE = 1.5  # times as far, that two plants fit alike
+FEWEST = 30  # lines, of which single ones can be told as outliers
 DECISIVE = 1.0  # deviance a line
 ROBUST = 1.5  # times nearer, as a fit has to be that outliers hardly move
 BETTER = 3.0  # times nearer, as a class has to be that is taken for the right one
@@ -56,7 +57,7 @@ def fits_reversed(
 
 def has_outliers(test: FrequencyResponse, wanted: Wanted, distance: float) -> bool:
     """Whether a fit that single lines hardly move is far nearer to most lines than least squares, at ``distance``."""
-    if distance < SUSPECT:
+    if distance < SUSPECT or test.omega.size < FEWEST:
         return False
     try:
         result = fit_plant([test], wanted, soft=True)
