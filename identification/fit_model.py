@@ -16,9 +16,9 @@ from identification.fitting.single_test_fit import Misfit, Undetermined
 from identification.fitting.subspace_check import check_modes
 from identification.model.fit_record import FitRecord
 from identification.model.model_file import IdentifiedModel
-from identification.model.plant import PlantModel
+from identification.model.plant import INTEGRATORS, PlantModel
 from identification.model.reports import BoundReport, SubspaceCheck
-from identification.model.structure import INTEGRATORS, MOST_REAL, Wanted
+from identification.model.structure import MOST_REAL, Wanted
 from identification.output.cautions import POOR
 from identification.output.fit_facts import fit_record, standard_errors
 from identification.sweeps.joined_bands import joined_bands
@@ -94,8 +94,6 @@ def fit_model(
     Where the conjugate of all responses fits far better than they do, their phase has the other sign, as that of
     analysers that count a lag as positive, and the conjugate is fitted; ``record.conjugated`` says so.
     """
-    if not tests:
-        raise InputError("no test was given; expected one or more sweeps")
     within_band = without_noise(tests) if band is None else [within(test, *band) for test in tests]
     chosen = joined_bands(within_band)
     used, result, reversed_from = _fit_either_sign(chosen, wanted or Wanted(), soft=soft, seed=seed, tick=tick)

@@ -101,7 +101,7 @@ def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
     if any(test.conjugated for test in used):
         caption += " The sign of the phase is reversed, as in the fit."
     with sentences_of({}, output, "bode", model):
-        files = rendered(plot_bode(identified, tests), output, "bode", caption)
+        files = rendered(plot_bode(identified, used), output, "bode", caption)
     write(files)
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from experiments.runs.references import SampledReference
+from identification.base.digits import showing_difference
 from identification.base.errors import InputError
-from identification.formats.columns import digits
 from identification.formats.csv_file import read_columns
 
 COLUMNS = ("time_s", "reference")
@@ -31,7 +31,7 @@ def read_reference(path: Path) -> SampledReference:
     step = np.diff(time_s)
     late = np.flatnonzero((step < 0) | ((step == 0) & (np.roll(step, 1) == 0) & (np.arange(step.size) > 0)))
     if len(late):
-        before, after = digits(*time_s[late[0] : late[0] + 2])
+        before, after = showing_difference(*time_s[late[0] : late[0] + 2])
         line = tables[0].numbers[late[0] + 1]
         raise InputError(
             f"{path}, line {line}: time_s is {after} after {before}; expected increasing times, or two rows of one "

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 
 EXACT = 17  # digits, in which no two doubles are said alike
+SHOWN = 0.05  # of a difference that is rounded away
 
 
 def lower_end(value: float, digits: int) -> str:
@@ -32,3 +33,13 @@ def _rounded(value: float, digits: int, rounding: str) -> str:
 def percent(share: float) -> str:
     """A share in percent: two digits, or whole numbers from 100."""
     return f"{100 * share:.2g}" if share < 1 else f"{100 * share:.0f}"
+
+
+def showing_difference(found: float, expected: float) -> tuple[str, str]:
+    """Two numbers with ten digits, or with as many more as show by how much they differ."""
+    apart = found - expected
+    for count in range(10, EXACT + 1):
+        texts = (f"{found:.{count}g}", f"{expected:.{count}g}")
+        if abs(float(texts[0]) - float(texts[1]) - apart) <= SHOWN * abs(apart):
+            break
+    return texts

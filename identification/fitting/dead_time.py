@@ -33,6 +33,11 @@ def same_turn(omega: Real) -> float | None:
     return 2 * np.pi / spacing if abs(halves - np.rint(halves)) < SAME else None
 
 
+def tells_turns(omega: Real) -> bool:
+    """Whether lines (M,) are equally spaced and yet tell dead times apart that differ by a turn from line to line."""
+    return spacing_of(omega) is not None and same_turn(omega) is None
+
+
 def turns_sign(omega: Real) -> bool:
     """Whether :func:`same_turn` seconds turn the phase by half a turn, at all lines."""
     spacing = spacing_of(omega)
@@ -66,8 +71,7 @@ def likely_delays(omega: Real, response: Complex) -> Real:
     They are that of :func:`group_delay` and one turn less, since a lead looks like a delay of almost a turn; and some
     turns more, where the lines are equally spaced and yet tell these apart.
     """
-    spacing = spacing_of(omega)
-    more = MORE_TURNS if spacing is not None and same_turn(omega) is None else 0
+    more = MORE_TURNS if tells_turns(omega) else 0
     return np.asarray(group_delay(omega, response) + np.arange(-1, more + 1) * turn_of(omega))
 
 

@@ -40,6 +40,8 @@ class FitResult:
         For each test the median of |test - nominal plant|/|test|.
     criterion
         Bayesian information criterion, summed over the tests, of each structure that was fitted to all.
+    chosen
+        Which of these it is; the plant's own may have two real roots for a mode of zeta > 1.
     alike
         By how much the criterion of other structures differs from that of the chosen one, where it hardly tells them
         apart, and where it is less: the chosen one has fewer roots outside the band, or roots that the data determine.
@@ -53,6 +55,7 @@ class FitResult:
     tests: tuple[OneFit, ...]
     distances: tuple[float, ...]
     criterion: dict[Structure, float]
+    chosen: Structure
     alike: dict[Structure, float]
     overdispersion: float
     soft: bool
@@ -148,6 +151,7 @@ def fit_plant(
             tests=tuple(fits),
             distances=tuple(median_distance(nominal.plant, test) for test in tests),
             criterion=criterion,
+            chosen=structure,
             alike={
                 other: value - criterion[structure]
                 for other, value in sorted(criterion.items(), key=lambda item: item[1])[: 1 + MOST_ALIKE]

@@ -12,7 +12,8 @@ from identification.base.arrays import Complex, Real
 from identification.fitting.first_guess import BAND
 from identification.fitting.least_squares import log_jacobian, response_of, stacked
 from identification.fitting.likelihood import Likely
-from identification.model.structure import INTEGRATORS, Structure
+from identification.model.plant import INTEGRATORS
+from identification.model.structure import Structure
 
 Side = tuple[Real, Real]  # log omega and log zeta of modes (n, 2), log rates of real roots (k,)
 

@@ -44,8 +44,10 @@ class OneFit:
         Of neighbouring normalised residuals; 0 within 1/sqrt(lines) when they are noise.
     distance
         Median of |test - plant|/|test|.
-    worst
-        Largest |test - plant| over its sigma.
+    worst, worst_omega
+        Largest |test - plant| over its sigma, and where it is, in rad/s.
+    around
+        Median of the same there and at the lines beside it.
     lines
         M, the number of frequencies.
     """
@@ -64,6 +66,8 @@ class OneFit:
     correlation: float
     distance: float
     worst: float
+    worst_omega: float
+    around: float
     lines: int
 
     @property

@@ -39,15 +39,16 @@ def fits_reversed(
     """
     if distance < SUSPECT or any(test.record is not None for test in tests):
         return False
-    if _with_unstable_poles(conjugated(tests[0]), RICHEST)[0] > distance:
+    turned = conjugated(tests[0])
+    if _with_unstable_poles(turned, RICHEST)[0] > distance:
         return False
     try:
-        result = fit_plant([conjugated(tests[0])], wanted, soft=soft)
+        result = fit_plant([turned], wanted, soft=soft)
     except InputError:
         return False
     found = result.tests[0].distance
     unstable, poles, structure = _with_unstable_poles(tests[0], result.structure)
-    _, its_poles, its_structure = _with_unstable_poles(conjugated(tests[0]), result.structure)
+    _, its_poles, its_structure = _with_unstable_poles(turned, result.structure)
     simpler = not its_poles.size and its_structure.free <= structure.free
     is_stable = not poles.size or ALIKE * found < unstable or (found < ALIKE * unstable and simpler)
     likelier = result.tests[0].deviance + DECISIVE * result.tests[0].lines < deviance

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
-from identification.fitting.dead_time import MORE_TURNS, same_turn, spacing_of, turn_of
+from identification.fitting.dead_time import MORE_TURNS, same_turn, tells_turns, turn_of
 from identification.fitting.first_guess import guesses
 from identification.fitting.least_squares import information, response_of
 from identification.fitting.likelihood import Likely, Lines, maximise
@@ -124,7 +124,7 @@ class ScaledTest:
     def other_turns(self, so_far: Likely) -> Likely:
         """The likeliest of ``so_far`` and of dead times some turns of equally spaced lines away, if these tell them."""
         best = so_far
-        if so_far.structure.delayed and spacing_of(self.omega) is not None and same_turn(self.omega) is None:
+        if so_far.structure.delayed and tells_turns(self.omega):
             for turns in range(-MORE_TURNS, MORE_TURNS + 1):
                 theta = so_far.theta.copy()
                 theta[-1] += turns * turn_of(self.omega)
@@ -195,6 +195,7 @@ class ScaledTest:
             )
         correlation = self.correlation(likely)
         z = np.abs(self._residual(likely) / self._sigma(likely)) ** 2
+        at = int(np.argmax(z))
         freedom = 1 - (structure.free + 1) / (2 * self.omega.size)  # the ratio of the noise's two levels counts too
         spread = float(np.mean(z)) / 2 / freedom
         if self.soft:
@@ -213,7 +214,9 @@ class ScaledTest:
             chi_square=float(np.mean(z)) / freedom,
             correlation=correlation,
             distance=distance,
-            worst=float(np.sqrt(np.max(z))),
+            worst=float(np.sqrt(z[at])),
+            worst_omega=float(self.omega[at] * self.centre),
+            around=float(np.median(np.sqrt(z[max(0, at - 1) : at + 2]))),
             lines=self.omega.size,
         )
 

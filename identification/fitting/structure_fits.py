@@ -57,6 +57,7 @@ class StructureFits:
         return sum(map(self._criterion_of, range(len(self.tests)), self.fits[structure]))
 
     def preference(self, structure: Structure) -> float:
+        """The criterion, and ALIKE for each zero in the right half plane: it has to be asked for."""
         return self.criterion(structure) + ALIKE * structure.right
 
     def white(self, structure: Structure) -> bool:
@@ -117,6 +118,7 @@ class StructureFits:
         return fit.deviance / self.overdispersion + self._penalty(i, fit.structure) + hidden + needle
 
     def deviance(self, structure: Structure) -> float:
+        """-2 log likelihood, summed over the tests."""
         return sum(fit.deviance for fit in self.fits[structure])
 
     def _penalty(self, i: int, structure: Structure) -> float:

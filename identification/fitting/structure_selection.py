@@ -16,7 +16,8 @@ from identification.fitting.neighbouring_structures import (
     within_band,
 )
 from identification.fitting.structure_fits import ALIKE, StructureFits
-from identification.model.structure import INTEGRATORS, Structure
+from identification.model.plant import INTEGRATORS
+from identification.model.structure import Structure
 
 MOST_MODES = 8
 BEHIND = 1.0  # deviance a line, behind the best number of integrators, at which another one is given up

@@ -37,7 +37,6 @@ EXCLUSIVE: list[tuple[set[str], ...]] = [
 ]
 MOST_NAMES = 12  # in one sentence
 MOST_CHARACTERS = 40  # of something found
-SHOWN = 0.05  # of a difference that is rounded away
 
 
 @dataclass(frozen=True)
@@ -147,16 +146,6 @@ def rows_of(table: Table, rows: Whole) -> Table:
     """The table with the chosen rows, in their order."""
     columns = {name: values[rows] for name, values in table.columns.items()}
     return replace(table, columns=columns, numbers=table.numbers[rows])
-
-
-def digits(found: float, expected: float) -> tuple[str, str]:
-    """Two numbers with ten digits, or with as many more as show by how much they differ."""
-    apart = found - expected
-    for count in range(10, 18):
-        texts = (f"{found:.{count}g}", f"{expected:.{count}g}")
-        if abs(float(texts[0]) - float(texts[1]) - apart) <= SHOWN * abs(apart):
-            break
-    return texts
 
 
 def quoted(text: str) -> str:

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from identification.base.arrays import Array
-from identification.formats.mat_variable import Variable, nothing
+from identification.formats.mat_variable import Variable, nothing, unreadable
 from identification.formats.sizes import MOST_BYTES
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -48,11 +48,11 @@ def _variable(item: h5py.Group | h5py.Dataset) -> Variable:
     kind = item.attrs.get("MATLAB_class", "struct" if is_group else _usual_class(item.dtype))
     kind = kind.decode("latin-1") if isinstance(kind, bytes) else str(kind)
     if "MATLAB_object_decode" in item.attrs:
-        return Variable(kind, (), False, _nothing_to_read, nothing)
+        return Variable(kind, (), False, unreadable, nothing)
     if is_group:
         is_struct = kind == "struct"
         fields = cache(lambda: dict(_members(item))) if is_struct else nothing
-        return Variable(kind if is_struct else "sparse", (1, 1), False, _nothing_to_read, fields)
+        return Variable(kind if is_struct else "sparse", (1, 1), False, unreadable, fields)
     shape = (0, 0) if "MATLAB_empty" in item.attrs else item.shape[::-1]
     is_complex = item.dtype.kind == "c" or item.dtype.names == ("real", "imag")
     return Variable(kind, shape, is_complex, partial(_values, item, kind), nothing)
@@ -88,7 +88,3 @@ def _values(item: h5py.Dataset, kind: str) -> Array:
     pairs = np.empty(values.shape, dtype=complex)
     pairs.real, pairs.imag = values["real"], values["imag"]
     return pairs
-
-
-def _nothing_to_read() -> Array:
-    raise ValueError

@@ -16,7 +16,7 @@ from itertools import islice
 import numpy as np
 
 from identification.base.arrays import Array
-from identification.formats.mat_variable import Variable, nothing
+from identification.formats.mat_variable import Variable, nothing, unreadable
 from identification.formats.sizes import MOST_BYTES
 
 HEADER = 128
@@ -94,7 +94,7 @@ def _variable(body: memoryview, order: str, packed: memoryview | None = None) ->
     flags = struct.unpack_from(f"{order}I", next(elements)[1])[0]
     if flags & 0xFF == OPAQUE:
         name, _, kind = (_text(text) for _, text in islice(elements, 3))
-        return name, Variable(kind, (), False, _nothing_to_read, nothing)
+        return name, Variable(kind, (), False, unreadable, nothing)
     (_, sizes), (_, name_bytes) = islice(elements, 2)
     shape = struct.unpack(f"{order}{len(sizes) // 4}i", sizes)
     if len(shape) < 2 or min(shape) < 0:
@@ -164,7 +164,3 @@ def _fields(body: memoryview, order: str) -> dict[str, Variable]:
 
 def _text(content: memoryview) -> str:
     return bytes(content).split(b"\0")[0].decode("latin-1")
-
-
-def _nothing_to_read() -> Array:
-    raise ValueError

@@ -49,3 +49,8 @@ class Variable:
 def nothing() -> dict[str, Variable]:
     """The fields of what is no single structure."""
     return {}
+
+
+def unreadable() -> Array:
+    """What reads a variable that holds no numbers or letters; raises one of DAMAGED."""
+    raise ValueError

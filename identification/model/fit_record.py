@@ -145,8 +145,6 @@ class FitRecord:
     ----------
     source, method, loss
         In words.
-    conjugated
-        Whether the sign of any test's phase was reversed.
     synthetic
         Whether any of the tests was never measured.
     structure
@@ -177,7 +175,6 @@ class FitRecord:
     structure: str
     method: str
     loss: str
-    conjugated: bool
     criterion: Criterion
     lower: Numbers
     upper: Numbers
@@ -190,6 +187,11 @@ class FitRecord:
     tests: tuple[FittedTest, ...]
     bound: BoundReport
     checks: Mapping[str, SubspaceCheck]
+
+    @property
+    def conjugated(self) -> bool:
+        """Whether the sign of any test's phase was reversed."""
+        return any(test.conjugated for test in self.tests)
 
     def to_dict(self, plant: PlantModel) -> dict[str, Any]:
         """The ``fit`` object of the model.json of a plant."""
@@ -235,7 +237,6 @@ class FitRecord:
             structure=words(content, "structure"),
             method=words(content, "method"),
             loss=words(content, "loss"),
-            conjugated=truth(content, "conjugated"),
             criterion=record(Criterion, member(content, "criterion"), {"Mapping[str, float]": _by_name}),
             lower=values(ends, "lower"),
             upper=values(ends, "upper"),

@@ -17,6 +17,8 @@ from identification.model.python_control import from_control, lowest, to_control
 if TYPE_CHECKING:
     from control import TransferFunction
 
+INTEGRATORS = range(-2, 3)
+"""Poles at s = 0 that a plant may have; a negative number counts zeros there."""
 NEAR_ZERO = 1e-7
 """Of the fastest root's modulus, within which a pole may be at s = 0 but for rounding."""
 
@@ -63,7 +65,7 @@ class PlantModel:
             raise InputError("the plant's gain is 0; expected any other number")
         if self.delay_s < 0:
             raise InputError(f"delay_s is {self.delay_s:g}; expected zero or a positive number of seconds")
-        if isinstance(self.integrators, bool) or self.integrators not in (-2, -1, 0, 1, 2):
+        if isinstance(self.integrators, bool) or self.integrators not in INTEGRATORS:
             raise InputError(f"integrators is {shown(self.integrators)}; expected an integer from -2 to 2")
         require_left(real_poles=self.real_poles, pole_modes=self.pole_modes)
         for rate in self.real_zeros:

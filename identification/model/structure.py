@@ -13,8 +13,6 @@ from identification.model.plant import PlantModel
 
 MOST_REAL = 3
 """Real zeros, and real poles, that can be asked for."""
-INTEGRATORS = range(-2, 3)
-"""Poles at s = 0 that a plant may have; a negative number counts zeros there."""
 
 
 @dataclass(frozen=True, order=True)
@@ -152,11 +150,6 @@ class Structure:
             pairs[side] += int(overdamped.sum())
         there = replace(self, real_pairs=(pairs[0], pairs[1], pairs[2]))
         return there, np.concatenate([theta[:1], *(part.ravel() for part in parts), theta[-1:]])
-
-    @property
-    def as_chosen(self) -> Structure:
-        """The same degrees, with two real roots written as a mode, as structures are compared."""
-        return replace(self, real_pairs=(0, 0, 0))
 
     def plant(self, theta: Real, sign: float) -> PlantModel:
         """The plant of theta in physical units; ``sign`` is the gain's."""

@@ -15,7 +15,7 @@ from identification.fitting.neighbouring_structures import OUTSIDE
 from identification.fitting.structure_fits import ALIKE, RUN
 from identification.model.parameter import Parameter
 from identification.model.plant import PlantModel
-from identification.sweeps.response import FrequencyResponse, alias_free
+from identification.sweeps.response import FrequencyResponse
 
 POOR = 0.15  # median distance of a test from its own fit
 WORSE = 3.0  # times the distance of a test from its own fit
@@ -32,7 +32,7 @@ def cautions(result: FitResult, tests: Sequence[FrequencyResponse], reversed_fro
     edges = _edges(result.plant, np.concatenate([test.omega for test in tests]))
     return [
         *_reversed(result, tests, reversed_from),
-        *_outliers(result, tests),
+        *_outliers(result),
         *_misfit(result),
         *_open(result, edges),
         *_dead_time(result, tests),
@@ -52,21 +52,15 @@ def _reversed(result: FitResult, tests: Sequence[FrequencyResponse], reversed_fr
         )
 
 
-def _outliers(result: FitResult, tests: Sequence[FrequencyResponse]) -> Iterator[str]:
+def _outliers(result: FitResult) -> Iterator[str]:
     """Lines that the plant misses by far more than its neighbours."""
-    for test, fit in zip(tests, result.tests, strict=True):
-        sigma = np.hypot(fit.floor, fit.relative * np.abs(fit.plant(1j * test.omega)))
-        if test.excitation is not None:
-            sigma = sigma * np.sqrt(test.excitation)
-        miss = np.abs(alias_free(test, fit.plant).response - fit.plant(1j * test.omega)) / sigma
-        worst = int(np.argmax(miss))
-        around = np.median(miss[max(0, worst - 1) : worst + 2])
-        where = f"{test.name}: the plant misses the line at {test.omega[worst] / (2 * np.pi):.4g} Hz"
-        if miss[worst] > OUTLIER and around < OUTLIER / 3:
+    for fit in result.tests:
+        where = f"{fit.name}: the plant misses the line at {fit.worst_omega / (2 * np.pi):.4g} Hz"
+        if fit.worst > OUTLIER and fit.around < OUTLIER / 3:
             mended = "the loss is soft-L1 for it" if result.soft else "--loss soft-l1 lets it hardly count"
-            yield f"{where} by {miss[worst]:.2g} times the noise and those beside it by little: an outlier; {mended}"
-        elif around > RUN:
-            yield f"{where} and those beside it by {around:.2g} times the noise: it lacks something there"
+            yield f"{where} by {fit.worst:.2g} times the noise and those beside it by little: an outlier; {mended}"
+        elif fit.around > RUN:
+            yield f"{where} and those beside it by {fit.around:.2g} times the noise: it lacks something there"
 
 
 def _misfit(result: FitResult) -> Iterator[str]:

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from identification.base.arrays import Real
-from identification.formats.columns import Table, digits
+from identification.base.digits import showing_difference
+from identification.formats.columns import Table
 
 JITTER = 0.05  # largest distance of a sample from the uniform grid, in sampling intervals
 ROUNDED = 1e-6  # of the last digit: the distance of a stamp from a multiple of it, beside the rounding of floats
@@ -59,7 +60,7 @@ def on_even_grid(table: Table, *, resample: bool) -> tuple[Table, float]:
     if not resample:
         apart = np.abs(steps - usual)
         row = 1 + int(np.argmax(apart > 0.9 * apart.max()))
-        found, due = digits(time_s[row], time_s[row - 1] + usual)
+        found, due = showing_difference(time_s[row], time_s[row - 1] + usual)
         table.refuse_row(
             row,
             "time_s",
@@ -126,6 +127,6 @@ def _check_order(table: Table) -> None:
     late = np.diff(time_s, prepend=-np.inf) <= 0
     if late.any():
         row = int(np.argmax(late))
-        found, before = digits(time_s[row], time_s[row - 1])
+        found, before = showing_difference(time_s[row], time_s[row - 1])
         place = table.at(row - 1, "time_s")
         table.refuse_row(row, "time_s", f"more than the {before} of {place} (increasing, no duplicates)", f"is {found}")

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from identification.base.arrays import Complex, Real
+from identification.base.digits import showing_difference
 from identification.base.errors import InputError
-from identification.formats.columns import Table, digits, rows_of
+from identification.formats.columns import Table, rows_of
 from identification.sweeps.estimate_response import estimate_response
 from identification.sweeps.even_grid import on_even_grid
 from identification.sweeps.response import FrequencyResponse, Record
@@ -219,6 +220,6 @@ def _check_numbers(table: Table) -> None:
 
 def _check_unit(table: Table, row: int | None, column: str, unit: str, other: str) -> None:
     if row is not None:
-        found, before = digits(table.columns[column][row], table.columns[column][row - 1])
+        found, before = showing_difference(table.columns[column][row], table.columns[column][row - 1])
         found = f"is {found} after the {before} of {table.at(row - 1, column)}, as if wrapped in {other}"
         table.refuse_row(row, column, unit, found)

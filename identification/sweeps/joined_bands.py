@@ -18,6 +18,8 @@ def joined_bands(tests: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
 
     Held records stay apart: the aliases in their responses are those of their own sampling.
     """
+    if len(tests) < 2:
+        return list(tests)
     low, high = min(test.omega[0] for test in tests), max(test.omega[-1] for test in tests)
     alike = all(np.log(test.omega[-1] / test.omega[0]) > SHARE * np.log(high / low) for test in tests)
     if alike or any(test.record is not None and test.record.held for test in tests):

@@ -97,15 +97,16 @@ def _running(values: Real, width: int) -> Real:
 
 def _scattered(tests: Sequence[FrequencyResponse]) -> Flags:
     """(M,) where tests on the same lines differ by more than their mean; False without such tests."""
-    first = tests[0]
-    alike = all(np.array_equal(test.omega, first.omega) for test in tests)
-    if len(tests) < FEWEST_TESTS or not alike or first.omega.size < WINDOW:
-        return np.zeros(1, dtype=bool)
+    none = np.zeros(1, dtype=bool)
+    if len(tests) < FEWEST_TESTS or tests[0].omega.size < WINDOW:
+        return none
+    if not all(np.array_equal(test.omega, tests[0].omega) for test in tests):
+        return none
     responses = np.array([test.response for test in tests])
-    ratio = np.abs(responses.std(axis=0, ddof=1)) / np.maximum(np.abs(responses.mean(axis=0)), np.finfo(float).tiny)
-    noisy = _running(ratio, WINDOW) > 1
+    scatter, mean = responses.std(axis=0, ddof=1), np.abs(responses.mean(axis=0))
+    ratio = np.divide(scatter, mean, out=np.where(scatter > 0, np.inf, 0.0), where=mean > 0)
     of_one_plant = np.quantile(ratio, QUARTER) < AGREE
-    return noisy if of_one_plant else np.zeros(1, dtype=bool)
+    return _running(ratio, WINDOW) > 1 if of_one_plant else none
 
 
 def _trimmed(test: FrequencyResponse, noisy: Flags) -> FrequencyResponse:
@@ -117,7 +118,7 @@ def _trimmed(test: FrequencyResponse, noisy: Flags) -> FrequencyResponse:
             kept[side][: int(np.argmax(total)) + 1] = False
     if not kept.any():
         raise InputError(f"{test.name}: every line is more noise than response; expected lines that show the plant")
-    return test if kept.all() else only(test, kept, "more noise than response")
+    return only(test, kept, "more noise than response")
 
 
 def only(test: FrequencyResponse, kept: Flags, reason: str) -> FrequencyResponse:

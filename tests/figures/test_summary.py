@@ -78,7 +78,6 @@ def record_of(plant: PlantModel, tests: list[FrequencyResponse], bound: Additive
         structure=str(structure),
         method="maximum likelihood",
         loss="least squares",
-        conjugated=False,
         criterion=Criterion("BIC", 1.0, {str(structure): 5.0, "1 integrator": 99.0}, str(structure)),
         lower=share(0.98),
         upper=share(1.02),
