@@ -83,7 +83,7 @@ def forced(cells: Cells, mu: np.ndarray, r: Samples, gain: float) -> float:
     second, fourth = (np.maximum(*np.abs(chain.impulse[power] @ p.T)) for power in (2, 4))
     sixth = weight @ (np.abs(chain.impulse[6]).max(axis=0) + powers[3] / 8)
     bend = (second + (fourth + sixth / 8) / 8) / 8 * SPARE + off
-    if cells.start == "periodic" and cells.plant.integrators:
+    if cells.start == "periodic" and cells.plant.integrators > 0:
         middle = float(np.median(right))
         left, right, area = left - middle, right - middle, area - middle
         off = off + UNIT * (abs(middle) + np.abs(left) + np.abs(right) + np.abs(area))
@@ -130,7 +130,7 @@ def reached(cells: Cells, u: np.ndarray, r: Samples, gain: float, counted: slice
     values = np.append(r.values, r.values[0]) if cells.start == "periodic" else r.values
     left = values[:-1][counted] - gain * (z @ chain.output[0, 0])
     right = values[1:][counted] - gain * (z @ chain.output[0, 1])
-    if cells.start == "periodic" and cells.plant.integrators:
+    if cells.start == "periodic" and cells.plant.integrators > 0:
         middle = (max(left.max(), right.max()) + min(left.min(), right.min())) / 2
         left, right = left - middle, right - middle
     inside = np.maximum(np.abs(left), np.abs(right)) + gain * (bend + off + stray)

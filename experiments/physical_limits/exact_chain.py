@@ -74,6 +74,8 @@ def chain(plant: PlantModel, cell_s: Fraction, count: int) -> Chain:
     """
     A, b, end = _sections(plant, cell_s)
     row = [Fraction(plant.gain) * cell_s**plant.integrators * (k == end) for k in range(len(b))]
+    for _ in range(-plant.integrators):
+        row = _times(row, A)
     for rate in plant.real_zeros:
         row = _sum(row, [x / (Fraction(rate) * cell_s) for x in _times(row, A)])
     for mode in plant.zero_modes:
@@ -120,7 +122,7 @@ def _sections(plant: PlantModel, cell_s: Fraction) -> tuple[list[Row], Row, int]
     sections = [*plant.pole_modes, *(Mode(rate, 1.0) for rate in plant.real_poles)]
     real = [False] * len(plant.pole_modes) + [True] * len(plant.real_poles)
     order = sorted(range(len(sections)), key=lambda k: (-sections[k].omega, k))
-    n = 2 * len(plant.pole_modes) + len(plant.real_poles) + plant.integrators
+    n = 2 * len(plant.pole_modes) + len(plant.real_poles) + max(0, plant.integrators)
     A, b, source, at = [[Fraction(0)] * n for _ in range(n)], [Fraction(0)] * n, -1, 0
 
     def driven(entry: int, gain: Fraction) -> None:

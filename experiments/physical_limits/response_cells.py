@@ -50,7 +50,7 @@ class Cells:
     @property
     def stable(self) -> int:
         """How many states are not integrators; they come first."""
-        return len(self.chain.b) - self.plant.integrators
+        return len(self.chain.b) - max(0, self.plant.integrators)
 
     def states(self, u: np.ndarray) -> np.ndarray:
         """x at the cells' ends, shape (count + 1, n), for u (count,), constant in each cell."""
@@ -226,7 +226,7 @@ class Cells:
         n, kept = len(end), np.arange(len(end))
         follows, free = (n - 1, self.stable) if adjoint else (self.stable, n - 1)
         x = np.zeros(n)
-        if self.plant.integrators:
+        if self.plant.integrators > 0:
             x[kept != free] = np.linalg.lstsq(lacking[kept != follows][:, kept != free], end[kept != follows])[0]
         else:
             x[:] = np.linalg.lstsq(lacking, end)[0]
