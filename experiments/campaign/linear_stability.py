@@ -42,8 +42,9 @@ class PerturbedLoop:
 
         1 + P_true C = (1 + P C) (1 + D C S),    S = 1/(1 + P C).
 
-    C S is stable, since the nominal loop is. D is stable too: the modes of both plants are damped, and K/s is the same
-    in both, so that D has no pole at s = 0. D C S therefore has no pole in the closed right half plane, and it
+    C S is stable, since the nominal loop is, and with integrators in P it vanishes at s = 0 as s^q does. D is stable
+    too, but for a pole at s = 0 that D C S does not have: the modes of both plants are damped, and K/s^q is the same in
+    both. D C S therefore has no pole in the closed right half plane, and it
     vanishes as s grows there: P and P_true are strictly proper, S tends to 1, C is proper. By the argument principle
     the loop with P_true has as many roots in the open right half plane as f(j omega) = 1 + D C S turns about 0
     clockwise while omega grows from -infinity to infinity: as the turns of its phase in units of -pi from 0 on, f
@@ -97,14 +98,12 @@ class PerturbedLoop:
         not proved: a turn that begins and ends between two points would be missed. Where |D C S| < 1 at all
         frequencies the number is 0 without it.
         """
-        if (true.integrators, true.gain if true.integrators else 0.0) != (
-            self.plant.integrators,
-            self.plant.gain if self.plant.integrators else 0.0,
-        ):
+        same_gain = true.integrators <= 0 or true.gain == self.plant.gain
+        if true.integrators != self.plant.integrators or not same_gain:
             raise InputError("the true plant's integrators differ from the model's; expected the same, gain and all")
         modes = [*true.zero_modes, *true.pole_modes]
-        near = np.concatenate([mode.omega * np.exp(min(mode.zeta, 0.1) * AROUND) for mode in modes] or [np.zeros(0)])
-        near = np.concatenate([near, self._further(true)])
+        around = [mode.omega * np.exp(min(abs(mode.zeta), 0.1) * AROUND) for mode in modes]
+        near = np.concatenate([*around, self._further(true)])
         omega = np.concatenate([self._omega, near])
         plant, control = self._on_grid
         known = (true(1j * self._omega) - plant) * control

@@ -69,7 +69,7 @@ def steady_constant(plant: PlantModel, offset: float, slope: float) -> float:
         by itself. Infinite where the control has to grow for ever: under a slope for q = 0, and under a constant or a
         slope for q < 0, where the control is the integral of r/K.
     """
-    if slope and plant.integrators < 1 or offset and plant.integrators < 0:
+    if (slope and plant.integrators < 1) or (offset and plant.integrators < 0):
         return math.inf
     return {0: offset, 1: slope}.get(plant.integrators, 0.0) / plant.gain
 
