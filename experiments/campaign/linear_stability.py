@@ -83,8 +83,8 @@ class PerturbedLoop:
         Parameters
         ----------
         true
-            P_true, with as many integrators and as many poles in the right half plane as the model, and the same gain if
-        there are integrators.
+            P_true, with as many integrators and as many poles in the right half plane as the model, and the same gain
+            if there are integrators.
 
         Raises
         ------

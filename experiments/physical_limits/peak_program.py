@@ -44,7 +44,7 @@ class PeakProgram:
     Parameters
     ----------
     plant
-        Strictly proper; its dead time is left out.
+        With a pole; its dead time is left out.
     span_s
         The period, or from rest at t = 0 the horizon, in seconds.
     steps
@@ -153,17 +153,18 @@ class PeakProgram:
         doubt = reference.rounding(float(self.span_s) + ahead_s) / scale + 4 * UNIT
         r, gain = Samples(values / scale, doubt, reference.bend * self.cell_s**2 / 8 / scale), limit / scale
         u, mu = self._optimum(r.values, gain, slice(first, len(values)))
-        if np.abs(mu[self.counted :]).sum() > LOST * np.abs(mu).sum():
-            _, mu = self._optimum(r.values, gain, counted)
+        weighed = slice(first, self.counted - (self._cells.jumps and not self.periodic))
+        if np.abs(mu[weighed.stop :]).sum() > LOST * np.abs(mu).sum():
+            _, mu = self._optimum(r.values, gain, weighed)
         cells, more = self._cells, gain * (1 + 2 * UNIT)
         controls = (whole(self._average(u, width, first), self._centred) for width in WIDTHS)
         uppers = [reached(cells, control, r, more, counted) for control in controls]
-        lowers = [forced(cells, self._weights(mu, width, first), r, more) for width in WIDTHS] if mu.any() else [0.0]
+        lowers = [forced(cells, self._weights(mu, width, weighed), r, more) for width in WIDTHS] if mu.any() else [0.0]
         return outward(scale * max(0.0, *lowers), scale * min(uppers))
 
-    def _weights(self, mu: np.ndarray, width: float, first: int) -> np.ndarray:
+    def _weights(self, mu: np.ndarray, width: float, counted: slice) -> np.ndarray:
         """Averaged weights for :func:`experiments.physical_limits.certificates.forced`, none at the end of the span."""
-        weights = self._average(mu, width, first) if self.periodic else self._spread(mu, width, first)
+        weights = self._average(mu, width, 0) if self.periodic else self._spread(mu, width, counted)
         return whole(weights / np.abs(weights).sum(), self._centred)
 
     def _edges(self, first: int) -> np.ndarray:
@@ -180,7 +181,7 @@ class PeakProgram:
 
         The variables are the states at the steps' ends (but for the start from rest), u in the steps, the peak.
         """
-        c, n = self._cells.chain.c[None, :], len(self._cells.chain.b)
+        c, d, n, jumps = self._cells.chain.c[None, :], self._cells.chain.d, len(self._cells.chain.b), self._cells.jumps
         edges = self._edges(counted.start)
         lengths = np.diff(edges)
         steps = len(lengths)
@@ -196,11 +197,11 @@ class PeakProgram:
             nothing = sparse.csr_array((n * steps, 1))
             flow = [sparse.kron(these.T @ these @ before, kept), sparse.kron(these.T @ these, driven[:, None])]
             dynamics = dynamics - sparse.hstack([*flow, nothing])
-            for inside in range(0, length, length // SAMPLES):
+            for inside in [length // 2] if jumps else range(0, length, length // SAMPLES):
                 kept, driven = self._over(inside)
-                outputs.append(sparse.hstack([sparse.kron(these @ before, c @ kept), (c @ driven)[0] * these]))
+                outputs.append(sparse.hstack([sparse.kron(these @ before, c @ kept), ((c @ driven)[0] + d) * these]))
                 samples.append(edges[chosen] + inside)
-        if not self.periodic:
+        if not (self.periodic or jumps):
             outputs.append(sparse.hstack([sparse.kron(state[-1:], c), sparse.csr_array((1, steps))]))
             samples.append(edges[-1:])
         sampled = np.concatenate(samples)
@@ -255,17 +256,17 @@ class PeakProgram:
             later = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
         return np.append(values[:first], later)
 
-    def _spread(self, mu: np.ndarray, width: float, first: int) -> np.ndarray:
-        """Weights from ``first`` on, each spread evenly to both sides, again and again, as far as the ends allow.
+    def _spread(self, mu: np.ndarray, width: float, counted: slice) -> np.ndarray:
+        """The weights that count, each spread evenly to both sides, again and again, as far as the ends allow.
 
         That keeps their sum and their mean time, and so the costates of two integrators before them.
         """
-        weights, later = np.zeros_like(mu), mu[first : self.counted]
+        weights, later = np.zeros_like(mu), mu[counted]
         place = np.arange(len(later))
         half = np.minimum(int(width * self.fineness / 2), np.minimum(place, place[::-1]))
         for _ in range(PASSES):
             rises = np.bincount(place - half, later / (2 * half + 1), len(later) + 1)
             falls = np.bincount(place + half + 1, later / (2 * half + 1), len(later) + 1)
             later = np.cumsum(rises - falls)[:-1]
-        weights[first : self.counted] = later
+        weights[counted] = later
         return weights
