@@ -3,5 +3,8 @@
 METHODS = ("zeros", "lagrange", "poles")
 """How Q is designed."""
 
+GUARANTEES = ("global", "robust", "sector")
+"""What the corrected compensator guarantees: whatever the control, so for every plant within W_a, up to a control."""
+
 SECTOR = 0.95
-"""Sector of the corrected compensator unless another is stated: \\|u\\| may reach twenty times the limits."""
+"""Sector of the corrected compensator where none is stated: \\|u\\| may reach twenty times the limits."""

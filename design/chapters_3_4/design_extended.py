@@ -12,9 +12,10 @@ from design.blocks.block import Block, plant_block, plant_denominator, plant_num
 from design.chapters_3_4.interpolate_Q import StableFunction, by_poles, by_zeros, conditions, lagrange
 from design.chapters_3_4.robust_roll_off import robust_free_part
 from design.chapters_3_4.smith_predictor import free_part, stabiliser
-from design.choices import SECTOR
 from design.design_file import Design
 from design.parameters import ExtendedParameters, Quotient, RollOff
+from design.stability.delay_loop import DelayLoop
+from design.stability.margins import robustness_of
 from identification.base.errors import InputError
 from identification.model.model_file import IdentifiedModel
 
@@ -28,8 +29,9 @@ def design_extended(
     inverse_epsilon: float = 0.0,
     robust_level: float | None = None,
     recovery_s: float | None = None,
-    sector: float = SECTOR,
+    sector: float | None = None,
     bandwidth: float | None = None,
+    guarantee: str | None = None,
 ) -> Design:
     """Chapters 3 and 4: Q, C_0, T_so, F1, F2, K_0, K_1, K, theta1~ and theta2.
 
@@ -53,7 +55,7 @@ def design_extended(
     robust_level
         Unless None, T_so rolls off as late as ||W_a C S|| <= robust_level < 1 allows, see
         :func:`design.chapters_3_4.robust_roll_off.robust_free_part`.
-    recovery_s, sector, bandwidth
+    recovery_s, sector, bandwidth, guarantee
         Of the corrected anti-windup, see :func:`design.anti_windup.judge.compensators`; unless given, the recovery
         takes no longer than exp(-a t) takes to 1 %.
 
@@ -87,7 +89,9 @@ def design_extended(
     F1 = plant_block(plant)
     # W_aw/(K R_0) with W_aw = -s T_so, Eq. (3.16), (3.17), (3.21), (3.29); it is -C_s S_s, (3.23)
     F2 = (free.T_so * plant_denominator(plant) * plant_numerator(plant).inverse()).scaled(-1.0)
-    thesis, corrected = compensators(plant, bound, float(np.log(1 / SETTLED)) / a, recovery_s, sector, bandwidth)
+    robustness = robustness_of(DelayLoop(F1, K, free.T_so, plant.delay_s), bound)
+    own_s = float(np.log(1 / SETTLED)) / a
+    thesis, corrected = compensators(plant, bound, own_s, recovery_s, sector, bandwidth, guarantee, robustness)
     return Design(
         kind="extended",
         plant=plant,
