@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from design.choices import GUARANTEES, METHODS, SECTOR
+from design.choices import GUARANTEES, METHODS, ROBUST_LEVEL, SECTOR
 from identification.base.command_line import CommandGroup, together
 from identification.base.digits import lower_end, upper_end
 from identification.base.errors import InputError
@@ -110,10 +110,10 @@ def delay_free(
     "omegas",
     type=float,
     multiple=True,
-    required=True,
     help="Angular frequency of the reference, rad/s; once for each; 0 is a constant.",
 )
-@click.option("--a", type=float, required=True, help="Closed-loop pole of the free part, rad/s.")
+@click.option("--reference-hz", "hertz", type=float, multiple=True, help="The same in Hz.")
+@click.option("--a", type=float, help="Closed-loop pole of the free part, rad/s; as fast as W_a allows unless given.")
 @click.option("--e", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
 @click.option("--f", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
 @click.option("--method", type=click.Choice(METHODS), default="zeros", show_default=True, help="How Q is designed.")
@@ -121,14 +121,19 @@ def delay_free(
     "--inverse-epsilon", type=float, default=0.0, show_default=True, help="Of R_eps^-1 = R_0^-1/(1 + eps s)^2 (3.2), s."
 )
 @click.option(
-    "--robust-level", type=float, help="Let T_so roll off as late as ||W_a C S|| <= LEVEL < 1 allows.", metavar="LEVEL"
+    "--robust-level",
+    type=float,
+    metavar="LEVEL",
+    help=f"T_so rolls off as late as |W_a C S| <= LEVEL < 1 allows; {ROBUST_LEVEL:g} where --a is not given, or the "
+    "plant is outside the thesis's class.",
 )
 @corrected_options
 @OUTPUT
 def extended(
     model: str,
     omegas: tuple[float, ...],
-    a: float,
+    hertz: tuple[float, ...],
+    a: float | None,
     e: tuple[float, ...],
     f: tuple[float, ...],
     method: str,
@@ -140,20 +145,28 @@ def extended(
     bandwidth: float | None,
     output: Path,
 ) -> None:
-    """Chapters 3 and 4: Smith predictor based controller and anti-windup with the exact dead time."""
+    """Chapters 3 and 4: controller and anti-windup with the exact dead time, for every plant.
+
+    With --reference-hz 0.5 alone the rest is chosen from the reference, the dead time and W_a, and said.
+    """
+    from math import tau
+
     from design.asked_model import asked_model
     from design.chapters_3_4.design_extended import design_extended
 
     if len(e) != len(f):
         raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected as many")
-    pairs = list(zip(e, f, strict=True))
+    if not omegas and not hertz:
+        raise InputError(
+            "no frequency of the reference is given; expected --reference-hz or --reference-omega, 0 for a constant"
+        )
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
     design = design_extended(
         given,
-        omegas,
+        (*omegas, *(tau * frequency for frequency in hertz)),
         a,
-        pairs,
+        list(zip(e, f, strict=True)) or None,
         method,
         inverse_epsilon,
         robust_level,
@@ -163,7 +176,7 @@ def extended(
         guarantee,
     )
     poles = ", ".join(f"{pole:.4g}" for pole in design.blocks["T_so"].poles)
-    _finish(design, model, output, f"Q designed by its {method}; closed loop with 1/s has the poles {poles}")
+    _finish(design, model, output, "\n  ".join((*design.free.reasons, f"T_so has the poles {poles}")))
 
 
 @main.command("anti-windup")

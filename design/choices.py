@@ -8,3 +8,6 @@ GUARANTEES = ("global", "robust", "sector")
 
 SECTOR = 0.95
 """Sector of the corrected compensator where none is stated: \\|u\\| may reach twenty times the limits."""
+
+ROBUST_LEVEL = 0.5
+"""What |W_a C S| is kept below unless another level is stated: half of what loses the proof of stability."""

@@ -118,7 +118,10 @@ def design_delay_free(
     own_s = math.log(1 / SETTLED) / (2 * problem.decay_rate)
     forward = K * plant_denominator(plant) * units.Lambda.inverse()
     robustness = robustness_of(DelayLoop(plant_block(plant.without_delay()), forward, Block(0.0), 0.0), bound)
-    thesis, corrected = compensators(plant, bound, own_s, recovery_s, sector, bandwidth, guarantee, robustness)
+    measured = model.fit.band[1] if model.fit else None
+    thesis, corrected = compensators(
+        plant, bound, own_s, recovery_s, sector, bandwidth, guarantee, robustness, measured
+    )
     return Design(
         kind="delay-free",
         plant=plant,

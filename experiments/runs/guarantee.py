@@ -1,4 +1,4 @@
-"""What a design guarantees of its saturated runs with one anti-windup: a sector, that every windup ends, or why nothing.
+"""What a design guarantees of its saturated runs with one anti-windup: a sector, that windup ends, or why nothing.
 
 What the sector is good for, and which sector a run needs, says :mod:`experiments.runs.sector_promise`; how much windup
 a run has left without one, :mod:`experiments.runs.windup_bound`.

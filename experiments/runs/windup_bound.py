@@ -2,8 +2,8 @@
 
 With M = 1 + theta1~ and v, the control of the loop without saturation, u~ = u - sat(u) obeys M u~ = v - sat(u). Let
 V = x'P x be the storage function of a positive real M, dV/dt <= 2 u~ (v - sat(u)), see
-:mod:`design.anti_windup.kyp_certificate`. Where v keeps a distance of delta from both limits u~ (sat(u) - v) is at least
-delta |u~|, whatever u is. So from any time t0 on, as long as v keeps it,
+:mod:`design.anti_windup.kyp_certificate`. Where v keeps a distance of delta from both limits u~ (sat(u) - v) is at
+least delta |u~|, whatever u is. So from any time t0 on, as long as v keeps it,
 
     the integral of |u~| <= V(t0)/(2 delta).                                                              (after a run)
 
@@ -90,7 +90,7 @@ def before_run(
         None where v or what it settles at reaches a limit at the last time.
     """
     beyond, distance = distances(linear, steady, limits)
-    squares, total = (cumulative_trapezoid(each, time_s, initial=0.0) for each in (beyond**2, beyond))
+    squares, total = (cumulative_trapezoid(each, time_s, initial=0) for each in (beyond**2, beyond))
     return _least(time_s, distance, (np.sqrt(stored + 2 * squares) + storage.steepness * total) ** 2 / 2)
 
 
@@ -99,7 +99,7 @@ def after_run_of_any_plant(
 ) -> WindupBound | None:
     """The bound from the control u that a run from rest had with a plant within W_a, v being its own; None as above."""
     saturated = np.clip(control, *limits)
-    supplied = cumulative_trapezoid((control - saturated) * (linear - saturated), time_s, initial=0.0)
+    supplied = cumulative_trapezoid((control - saturated) * (linear - saturated), time_s, initial=0)
     return _least(time_s, distances(linear, steady, limits)[1], np.maximum(supplied, 0.0))
 
 
@@ -137,9 +137,10 @@ class Windup:
                 "the windup ends once the linear loop's control stays within the limits, which it does not by the end"
             )
         known = "" if self.stored is None else f", to {self.stored:.3g} by the state then"
+        t0, delta, most = (f"{each:.3g}" for each in (self.bound.from_s, self.bound.distance, self.bound.most))
         return (
-            f"from t = {self.bound.from_s:.3g} s on the linear loop's control stays {self.bound.distance:.3g} within the "
-            f"limits, so that |u - sat(u)| integrates to {self.bound.most:.3g} at most{known}; it did to {self.was:.3g}"
+            f"from t = {t0} s on the linear loop's control stays {delta} within the limits, so that |u - sat(u)| "
+            f"integrates to {most} at most{known}; it did to {self.was:.3g}"
         )
 
 

@@ -23,6 +23,7 @@ from design.chapters_3_4.smith_predictor import (
     free_part,
     smith_controller,
     stabiliser,
+    thesis_factors,
 )
 from design.design_file import Design
 from design.hinf.closed_loop_norm import closed_loop_poles
@@ -479,7 +480,7 @@ def test_3_2_the_smith_predictor_based_controller(smith: Smith) -> None:
     exact = 1 / (plant.gain * R_0(plant, s)) * inner
     np.testing.assert_allclose(smith_controller(plant, smith.free.C_0, s), exact, rtol=1e-7)
     # with the approximate inverse, in the form that is realised: K/(1 - T_so exp(-T_d s))
-    K = stabiliser(plant, smith.free.T_so, inverse_epsilon=1e-3)[2]
+    K = stabiliser(plant, smith.free.T_so, inverse_epsilon=1e-3)
     approximate = 1 / (plant.gain * R_0(plant, s) * (1 + 1e-3 * s) ** 2) * inner
     np.testing.assert_allclose(anti_windup_controller(plant, K, smith.free.T_so, s), approximate, rtol=1e-6)
 
@@ -499,7 +500,7 @@ def test_3_3_3_4_and_4_3_the_free_part_at_the_reference(smith: Smith) -> None:
 def test_3_5_the_characteristic_equation_is_1_plus_C_0_over_s(smith: Smith) -> None:
     """Times the denominator of C_0/s it is the characteristic function of the loop, whose dead time is gone."""
     plant, free, s = smith.plant, smith.free, smith.s
-    loop = DelayLoop(plant_block(plant), stabiliser(plant, free.T_so)[2], free.T_so, plant.delay_s)
+    loop = DelayLoop(plant_block(plant), stabiliser(plant, free.T_so), free.T_so, plant.delay_s)
     exact = evaluate(loop.characteristic, s)[0]
     denominator = s * np.prod([s - pole for pole in free.C_0.poles], axis=0)
     visible = np.prod([s - root for root in loop.denominator.zeros], axis=0)
@@ -569,7 +570,7 @@ def test_3_11_the_plant_with_its_dead_time_as_a_block(seed: int) -> None:
 
 
 def extended_loop(smith: Smith) -> tuple[DelayLoop, Block]:
-    K = stabiliser(smith.plant, smith.free.T_so)[2]
+    K = stabiliser(smith.plant, smith.free.T_so)
     return DelayLoop(plant_block(smith.plant), K, smith.free.T_so, smith.plant.delay_s), K
 
 
@@ -694,7 +695,7 @@ def test_3_23_F_2_is_minus_C_s_S_s(designs: list[Design]) -> None:
 @each
 def test_3_24_and_3_31_the_new_controller(smith: Smith) -> None:
     """With T_so written out by C_0; and it is the Smith predictor's, since K is (3.29)."""
-    K, s = stabiliser(smith.plant, smith.free.T_so)[2], smith.s
+    K, s = stabiliser(smith.plant, smith.free.T_so), smith.s
     C_0 = smith.free.C_0(s)
     T_so = (C_0 / s) / (1 + C_0 / s)
     C_aw = anti_windup_controller(smith.plant, K, smith.free.T_so, s)
@@ -721,7 +722,8 @@ def test_3_25_the_sensitivity(smith: Smith) -> None:
 
 @each
 def test_3_26_to_3_29_the_stabiliser(smith: Smith) -> None:
-    K_0, K_1, K = (block(smith.s) for block in stabiliser(smith.plant, smith.free.T_so))
+    blocks = (*thesis_factors(smith.plant, smith.free.T_so), stabiliser(smith.plant, smith.free.T_so))
+    K_0, K_1, K = (block(smith.s) for block in blocks)
     C_0 = smith.free.C_0(smith.s)
     np.testing.assert_allclose(K, K_0 * K_1, rtol=1e-9)  # (3.26)
     np.testing.assert_allclose(K_1, 1 / (smith.plant.gain * R_0(smith.plant, smith.s)), rtol=1e-9)
@@ -733,7 +735,7 @@ def test_3_26_to_3_29_the_stabiliser(smith: Smith) -> None:
 def test_3_27_as_corrected(smith: Smith) -> None:
     """1 + P C_aw = (1 - T_so e + K_0 e/s)/(1 - T_so e), for any K_0; the print is 1 - T_so e/(1 + K_0 e/s)."""
     s, late, T_so = smith.s, smith.late, smith.free.T_so(smith.s)
-    _, K_1, K = stabiliser(smith.plant, smith.free.T_so)
+    K_1, K = thesis_factors(smith.plant, smith.free.T_so)[1], stabiliser(smith.plant, smith.free.T_so)
     for K_0 in (Block(1.0, (0j,)) * smith.free.T_so, Block(2.0, (-9 + 0j,), (-3 + 0j,))):
         loop = DelayLoop(plant_block(smith.plant), K_0 * K_1, smith.free.T_so, smith.plant.delay_s)
         function = evaluate(loop.characteristic, s)[0] / loop.denominator(s) / (1 - T_so * late)
