@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TypeVar
 
 from flint import acb, acb_poly, arb, arb_poly, ctx
@@ -90,6 +91,25 @@ def shared(first: Iterable[complex], second: Iterable[complex]) -> tuple[list[co
         else:
             left.append(root)
     return common, left, right
+
+
+def reflected(
+    first: Iterable[complex], second: Iterable[complex], decay_rate: float
+) -> tuple[list[complex], list[complex], list[complex]]:
+    """The roots of ``second`` that are mirror images, exactly, of ``first``'s in Re s = -decay_rate; what is left of both.
+
+    On that line s minus a root and s minus its image have the same modulus.
+    """
+    images, left, right = [], [], list(second)
+    for root in first:
+        mirrored_real = -2 * Fraction(decay_rate) - Fraction(root.real)
+        image = next((each for each in right if each.imag == root.imag and each.real == mirrored_real), None)
+        if image is None:
+            left.append(root)
+        else:
+            right.remove(image)
+            images.append(image)
+    return images, left, right
 
 
 def from_roots(roots: Iterable[acb]) -> arb_poly:
