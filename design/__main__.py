@@ -102,8 +102,8 @@ def delay_free(
     assert hinf is not None
     hidden = 0 if integral_action else given.plant.integrators
     drift = (
-        f"\n  C hides {'the integrator' if hidden == 1 else 'both integrators'} of the plant: a constant disturbance at its "
-        "input makes y drift, and with --integral-action it does not"
+        f"\n  C hides {'the integrator' if hidden == 1 else 'both integrators'} of the plant: y drifts under a "
+        "constant disturbance at its input; --integral-action prevents that"
     )
     unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
     _finish(

@@ -96,9 +96,9 @@ def shared(first: Iterable[complex], second: Iterable[complex]) -> tuple[list[co
 def reflected(
     first: Iterable[complex], second: Iterable[complex], decay_rate: float
 ) -> tuple[list[complex], list[complex], list[complex]]:
-    """The roots of ``second`` that are mirror images, exactly, of ``first``'s in Re s = -decay_rate; what is left of both.
+    """The roots of ``second`` that are exact mirror images of roots of ``first``, and what is left of each.
 
-    On that line s minus a root and s minus its image have the same modulus.
+    The mirror is the line Re s = -decay_rate. On it s minus a root and s minus its image have the same modulus.
     """
     images, left, right = [], [], list(second)
     for root in first:
@@ -187,7 +187,7 @@ def _disc(p: acb_poly, slope: acb_poly, z: acb, degree: int) -> acb:
     return z + acb(arb(0, radius), arb(0, radius))
 
 
-def right_half_plane_roots(even: arb_poly) -> list[acb]:
+def right_half_plane_roots(squares: Iterable[acb]) -> list[acb]:
     """The square roots with positive real part of the roots of a polynomial in x^2.
 
     Raises
@@ -195,7 +195,7 @@ def right_half_plane_roots(even: arb_poly) -> list[acb]:
     UndecidedError
         A root is not told from the imaginary axis.
     """
-    found = [root.sqrt() for root in polynomial_roots(even)]
+    found = [square.sqrt() for square in squares]
     if not all(root.real > 0 for root in found):
         raise UndecidedError("a root is on the imaginary axis")
     return found

@@ -123,28 +123,24 @@ def _require_reference(omegas: Sequence[float], epsilon: float | None) -> None:
 def _require_class(plant: PlantModel) -> None:
     """Refuse a plant whose zeros or poles the construction would have to cancel although they do not decay."""
     if plant.integrators < 0:
+        zeros = "a zero" if plant.integrators == -1 else f"{-plant.integrators} zeros"
         raise InputError(
-            f"the plant has {_count(-plant.integrators, 'zero')} at s = 0, so that a constant input leaves no output and "
-            "no bounded input holds one; the design expects none, but takes integrators, any stable poles and any zeros "
-            "in the left half plane"
+            f"the plant has {zeros} at s = 0, so that a constant input leaves no output and no bounded input holds "
+            "one; the design expects none there, and every zero in the left half plane"
         )
     for root in plant.right_zeros:
         raise InputError(
-            f"the plant has a zero in the right half plane, at {_shown(root)} rad/s, so that an input which makes the "
-            "output follow at once would grow without bound: F2 = (Lambda - A)/B has that zero as a pole; the design "
-            "expects every zero in the left half plane"
+            f"the plant has a zero in the right half plane, at {_shown(root)} rad/s, which is a pole of "
+            "F2 = (Lambda - A)/B: the input that makes y follow at once grows without bound; the design expects every "
+            "zero in the left half plane"
         )
     for root in plant_denominator(plant).zeros:
         if root.real > 0:
             raise InputError(
-                f"the plant has a pole in the right half plane, at {_shown(root)} rad/s, which C = K A/Lambda cancels, so "
-                "that the loop does not see it and the output grows from any disturbance; the design expects stable "
+                f"the plant has a pole in the right half plane, at {_shown(root)} rad/s, which C = K A/Lambda cancels: "
+                "the loop does not see it, and y grows without bound after any disturbance; the design expects stable "
                 "poles and up to two integrators"
             )
-
-
-def _count(number: int, word: str) -> str:
-    return f"a {word}" if number == 1 else f"{number} {word}s"
 
 
 def _shown(root: complex) -> str:

@@ -29,14 +29,15 @@ def central_controller(problem: Problem, gamma: float) -> Block | None:
 
     and K = T/(1 - T)/G; what cancels in it by construction is divided out before the roots are found. A point that is
     repeated has the next Taylor coefficients, in conj(s_l), of 1/(s + conj(s_l)) and conj(E(s_l))/(s + conj(s_l)). It
-    is the central controller of the two Riccati equations (K. Glover and J. C. Doyle, Systems & Control Letters 11 (1988)
-    167-172).
+    is the central controller of the two Riccati equations (K. Glover and J. C. Doyle, Systems & Control Letters 11
+    (1988) 167-172).
     """
     return decided(lambda: _central_controller(setting_of(problem, ctx.prec), problem, gamma))
 
 
 def _central_controller(setting: Setting, problem: Problem, gamma: float) -> Block:
-    nu = nu_of(level_of(setting, gamma))
+    level = level_of(setting, gamma)
+    nu = nu_of(level, polynomial_roots(level))
     points, values = setting.points, values_of(setting, nu)
     count = len(points)
     matrix = acb_mat(count, count, [entry for row in pick_matrix(points, values) for entry in row])
@@ -52,12 +53,12 @@ def _central_controller(setting: Setting, problem: Problem, gamma: float) -> Blo
         (-1) ** order * (full // acb_poly([s.conjugate(), 1]) ** (order + 1))
         for s, order in zip(points, orders, strict=True)
     ]
-    E_numerator, E_denominator = acb_poly([0]), full
+    above, below = acb_poly([0]), full
     for k, (weight, order) in enumerate(zip(weights, orders, strict=True)):
-        E_numerator += weight * kernels[k]
+        above += weight * kernels[k]
         for i in range(order + 1):
-            E_denominator += weight * values[k - order + i].conjugate() * kernels[k - i]
-    E_numerator, E_denominator = _real(E_numerator), _real(E_denominator)
+            below += weight * values[k - order + i].conjugate() * kernels[k - i]
+    E_numerator, E_denominator = _real(above), _real(below)
 
     d1, d2, nc = setting.d1, setting.d2, setting.nc
     T = E_numerator * d1 * nu + nc * in_x(setting.n1_squared) * mirrored(d2) * E_denominator

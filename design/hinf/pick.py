@@ -115,7 +115,7 @@ def setting_of(problem: Problem, bits: int) -> Setting:
         )
         for roots in (problem.G.poles, problem.G.zeros)
     )
-    roots = tuple(right_half_plane_roots(N))
+    roots = tuple(right_half_plane_roots(polynomial_roots(N)))
     return Setting(
         x,
         x.hurwitz(d1),
@@ -156,11 +156,12 @@ def is_feasible(problem: Problem, gamma: float) -> Obstacle | bool:
 
 def _judge(setting: Setting, problem: Problem, gamma: float) -> Obstacle | bool:
     level = level_of(setting, gamma)
-    obstacle = _single_point(setting, problem, gamma, level)
+    squares = polynomial_roots(level)
+    obstacle = _single_point(setting, problem, gamma, level, squares)
     if obstacle is not None:
         return obstacle
     points = setting.points
-    pivot = negative_pivot(pick_matrix(points, values_of(setting, nu_of(level))))
+    pivot = negative_pivot(pick_matrix(points, values_of(setting, nu_of(level, squares))))
     if pivot is None:
         return True
     return Obstacle(
@@ -169,13 +170,15 @@ def _judge(setting: Setting, problem: Problem, gamma: float) -> Obstacle | bool:
     )
 
 
-def _single_point(setting: Setting, problem: Problem, gamma: float, level: arb_poly) -> Obstacle | None:
+def _single_point(
+    setting: Setting, problem: Problem, gamma: float, level: arb_poly, squares: Sequence[acb]
+) -> Obstacle | None:
     """What S and T cost at one point of the closed half plane, where that is more than gamma."""
     top = level.degree()
     if (-1) ** top * level[top] < 0:
         constant = level_of(setting, 0.0)[top] / (level - level_of(setting, 0.0))[top] * -(arb(gamma) ** 2)
         return _costs(constant.sqrt(), "S + T = 1 at infinite frequency")
-    crossings = sorted(float((-root.real).sqrt()) for root in polynomial_roots(level) if root.imag == 0 > root.real)
+    crossings = sorted(float((-root.real).sqrt()) for root in squares if root.imag == 0 > root.real)
     if crossings:  # simple roots: the level is negative between two of them, or before the first
         omegas = [
             setting.line.unit * omega
@@ -220,9 +223,9 @@ def _modulus(weight: Block, s: complex) -> arb:
     return abs(value)
 
 
-def nu_of(level: arb_poly) -> arb_poly:
-    """The polynomial nu without roots in the right half plane."""
-    roots = [acb(-root.real, root.imag) for root in right_half_plane_roots(level) if not root.imag < 0]
+def nu_of(level: arb_poly, squares: Sequence[acb]) -> arb_poly:
+    """The polynomial nu without roots in the right half plane; ``squares`` are the roots of the level."""
+    roots = [acb(-root.real, root.imag) for root in right_half_plane_roots(squares) if not root.imag < 0]
     return abs(level[level.degree()]).sqrt() * from_roots(roots)
 
 
@@ -257,12 +260,15 @@ def orders_of(points: Sequence[acb]) -> list[int]:
 def pick_matrix(points: Sequence[acb], values: Sequence[acb]) -> list[list[acb]]:
     """Pick's matrix, shape (n, n), of points and values (n,), see :class:`Problem`."""
     conditions = list(zip(points, values, orders_of(points), strict=True))
-    rows: list[list[acb]] = []
+    rows: list[list[acb]] = []  # up to the diagonal: the matrix is Hermitian
     for k, (s, e, order) in enumerate(conditions):
         row: list[acb] = []
-        for t, f, other in conditions:
+        for t, f, other in conditions[: k + 1]:
             entry = (0 if order or other else 1) - e * f.conjugate()
-            entry -= (rows[k - 1][len(row)] if order else 0) + (row[-1] if other else 0)
+            if order:
+                entry -= rows[k - 1][len(row)] if len(row) < k else row[-1].conjugate()
+            if other:
+                entry -= row[-1]
             row.append(entry / (s + t.conjugate()))
         rows.append(row)
-    return rows
+    return [row + [below[k].conjugate() for below in rows[k + 1 :]] for k, row in enumerate(rows)]
