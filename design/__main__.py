@@ -94,7 +94,8 @@ def delay_free(
     from design.chapter_2.design_delay_free import design_delay_free
 
     if (epsilon is None) != integral_action:
-        raise InputError("expected either --epsilon EPSILON or --integral-action")
+        found = "both are given" if integral_action else "none is given"
+        raise InputError(f"of --epsilon and --integral-action {found}; expected one of them")
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
     design = design_delay_free(given, periods, epsilon, recovery, sector, bandwidth)
