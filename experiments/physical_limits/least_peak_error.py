@@ -285,8 +285,8 @@ def _harmonic(plant: PlantModel, reference: Reference, limit: float) -> Referenc
         )
     if not (plant.pole_modes or plant.real_poles or plant.integrators > 0):
         raise InputError(
-            f"the plant is the gain {plant.gain:.4g}, which leaves the largest |r| less {abs(plant.gain):.4g} times the "
-            "limit; expected a plant with a pole"
+            f"the plant is the gain {plant.gain:.4g}, whose least error is the largest |r| less {abs(plant.gain):.4g} "
+            "times the limit; expected a plant with a pole"
         )
     if reference.slope:
         raise InputError(f"the reference has the slope {reference.slope:g} a second; expected a periodic one")
