@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ class Resets:
     times_s
         Shape (b,), increasing, positive.
     values
-        Shape (b, g).
+        Shape (b, g); where NaN, a state goes on.
     """
 
     times_s: np.ndarray
@@ -29,7 +29,7 @@ class Resets:
         times_s, values = self.times_s, self.values
         if times_s.ndim != 1 or values.ndim != 2 or len(times_s) != len(values):
             raise InputError(f"the resets have shapes {times_s.shape}, {values.shape}; expected (b,) and (b, g)")
-        if not (np.isfinite(times_s).all() and np.isfinite(values).all()):
+        if not np.isfinite(times_s).all() or np.isinf(values).any():
             raise InputError("the resets are not finite; expected finite times and values")
         if np.any(np.diff(times_s, prepend=0.0) <= 0):
             raise InputError("the times of the resets do not increase from zero on; expected increasing positive times")
@@ -77,3 +77,17 @@ class SaturatedLoop:
                 raise InputError(f"the loop's output {name} is not finite; expected finite rows")
         if not (np.isfinite(self.delays).all() and np.all(self.delays >= 0)):
             raise InputError(f"the loop's dead times are {self.delays.tolist()} s; expected finite ones, not negative")
+
+
+def with_actuator(loop: SaturatedLoop, start: float) -> SaturatedLoop:
+    """Append a state to a loop, the output of an actuator with a rate limit, which moves nothing by itself."""
+    return replace(
+        loop,
+        A=np.pad(loop.A, (0, 1)),
+        B=np.append(loop.B, 0.0),
+        C=np.append(loop.C, 0.0),
+        D=np.pad(loop.D, ((0, 1), (0, 0))),
+        Z=np.pad(loop.Z, ((0, 0), (0, 1))),
+        x0=np.append(loop.x0, start),
+        outputs={name: (np.append(x, 0.0), w) for name, (x, w) in loop.outputs.items()},
+    )
