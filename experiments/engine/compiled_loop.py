@@ -24,9 +24,9 @@ class CompiledLoop(NamedTuple):
         [Z 0 0], and o rows [. 0 0] of what is watched.
     saturated
         The same with n rows [A B D].
-    slewing
-        Of an actuator with a rate limit, whose output is the last state: m is the rate at which that state moves, and
-        that state the input of the others. Otherwise as ``saturated``.
+    slewing, stopped
+        The same of an actuator with a rate limit while it slews, u between the limits and beyond: the last two states
+        are the rate and the actuator's output, and the constant is sat(u). Otherwise not used.
     tables
         Of these, see :class:`experiments.engine.step_table.Tables`, for the signals u, Z x and what is watched.
     delays, brief, x0
@@ -44,6 +44,7 @@ class CompiledLoop(NamedTuple):
     unsaturated: Rows
     saturated: Rows
     slewing: Rows
+    stopped: Rows
     tables: Tables
     delays: np.ndarray
     brief: np.ndarray
@@ -67,7 +68,7 @@ def compile_loop(
     brief, of which it is a whole part: then most delayed polynomials are read where they start. It is halved until all
     series end. A dead time is brief up to ``most_brief`` time constants of the fastest eigenvalue: the loop is taken
     without it, and what it changes is found in each step. Where nothing sets a step, ``idle_step`` seconds are one.
-    ``slews`` says that the last state is the output of an actuator with a rate limit.
+    ``slews`` says that the last two states are those of an actuator with a rate limit.
     """
     now = loop.delays == 0
     A, C = loop.A + loop.D[:, now] @ loop.Z[now], loop.C + loop.E[now] @ loop.Z[now]
@@ -84,9 +85,11 @@ def compile_loop(
     saturated = compressed(np.vstack([np.hstack([A, loop.B[:, None], D]), *read]))
     modes = [unsaturated, saturated]
     if slews:
-        last = np.eye(n)[-1]
-        moved = A + np.outer(loop.B, last)
-        modes.append(compressed(np.vstack([np.hstack([moved, last[:, None], D]), *read])))
+        m, knows = np.eye(n)[-1], np.zeros(n) if loop.B_limits is None else loop.B_limits
+        moved = A + np.outer(loop.B - knows, m) + np.outer(m, np.eye(n)[-2])
+        free_A, free_D = moved + np.outer(knows, C), D + np.outer(knows, E)
+        modes.append(compressed(np.vstack([np.hstack([free_A, np.zeros((n, 1)), free_D]), *read])))
+        modes.append(compressed(np.vstack([np.hstack([moved, knows[:, None], D]), *read])))
 
     fastest = _fastest(A, loop.B, C)
     step = min(FURTHEST / fastest if fastest > 0 else np.inf, most_step)
@@ -103,7 +106,8 @@ def compile_loop(
     return CompiledLoop(
         unsaturated=unsaturated,
         saturated=saturated,
-        slewing=modes[-1],
+        slewing=modes[-2],
+        stopped=modes[-1],
         tables=Tables(*(_stacked(alike) for alike in zip(*(tables for tables, _ in tabulated), strict=True))),
         delays=delays,
         brief=brief,

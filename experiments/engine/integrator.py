@@ -16,7 +16,7 @@ import numpy as np
 from experiments.engine.compiled_loop import CompiledLoop
 from experiments.engine.kinks import BEYOND, Past, drop, images, shift
 from experiments.engine.signals import change, driven, expand, fill, unfold
-from experiments.engine.slewing import leaves_actuator_mode, place
+from experiments.engine.slewing import direction, leaves_actuator_mode, place
 from experiments.engine.step_table import NEGLIGIBLE, NOTHING, advance, dot, times, whole_lanes
 from experiments.engine.watched import REACHED, STOP
 from identification.base.arrays import Array
@@ -52,7 +52,8 @@ def integrate(
     reset_times, resets
         Shapes (b,), (b, g): times at which the first g states take given values; where NaN, none.
     low, high, rate
-        Saturation limits and the most that m changes in a second, may be infinite; with a rate the last state is m.
+        Saturation limits and the most that m changes in a second, may be infinite; with a rate the last two states
+        are m' while m slews, and m.
     samples
         Shape (g, s): each group of what is watched is sampled at the sorted times samples[i] <= horizon; before zero
         it is as at zero. u is sampled with the first group.
@@ -66,12 +67,12 @@ def integrate(
     Returns
     -------
     values (1 + o, s), events (e,), modes (e,), places (e,), status, end, steps, tail
-        u and what is watched at the samples; event times with the mode entered (-1, 0, 1; slewing 2, -2) and m there;
-        COMPLETE, DIVERGED, ENDLESS (too many steps), CROWDED (too little room), EVENTFUL, UNSETTLED (a brief dead time
-        is too long) or STOPPED; the time reached; the number of steps; the largest last term of a signal's polynomial,
-        as a share of the largest that the signal was.
+        u and what is watched at the samples; event times with the mode entered (:mod:`experiments.engine.slewing`)
+        and m there; COMPLETE, DIVERGED, ENDLESS (too many steps), CROWDED (too little room), EVENTFUL, UNSETTLED (a
+        brief dead time is too long) or STOPPED; the time reached; the number of steps; the largest last term of a
+        signal's polynomial, as a share of the largest that the signal was.
     """
-    unsaturated, saturated, slewing, tables, delays, brief, x0, step, groups, _, _ = loop
+    unsaturated, saturated, slewing, stopped, tables, delays, brief, x0, step, groups, _, _ = loop
     slews, slope = rate < np.inf, rate * step
     n, k, room = len(x0), len(delays), bounds.room
     limit = max(abs(low) if np.isfinite(low) else 0.0, abs(high) if np.isfinite(high) else 0.0)
@@ -107,7 +108,7 @@ def integrate(
     seen = np.zeros(signals - 1 - k)  # of what is watched
     u = times(indptr, indices, data, n, V, 0)
     mode = 0 if slews else (1 if u > high else (-1 if u < low else 0))
-    kink, on_limit, standing = True, 0, 0
+    kink, on_limit, roots, standing = True, 0, 0, 0
     for g in range(len(samples)):
         while sample[g] < samples.shape[1] and samples[g, sample[g]] < 0:
             for o in range(groups[g], groups[g + 1]):
@@ -166,10 +167,14 @@ def integrate(
             filled[j] = fill(z, n, k, j, W, degree, min(1.0, (t_next - t) / step + BEYOND), NEGLIGIBLE * size[1 + j])
             known = max(known, filled[j])
 
-        which = min(abs(mode), 2)
+        side = direction(mode)
+        beyond = mode - 3 * side  # which limit u is
+        which = abs(beyond) + 2 * abs(side)
+        if slews:
+            x[n - 2] = side * rate
         for r in range(n):
             z[r] = x[r]
-        z[n] = 0.0 if mode == 0 else ((high if mode == 1 else low) if which == 1 else mode // 2 * rate)
+        z[n] = 0.0 if beyond == 0 else (high if beyond == 1 else low)
         radius = min(1.0, (t_next - t) / step + BEYOND)
         degree, power = unfold(tables, which, k, z, sizes, known, radius, usual, size, negligible, P, terms)
         for trial in range(TRIALS if some_brief else 0):
@@ -198,8 +203,8 @@ def integrate(
         if reset < len(reset_times) and t_next == reset_times[reset]:
             whole = False  # it ends there to the last digit
         reach = 1.0 if whole else max((t_next - t - late) / step, 0.0)
-        exit_at, entered, crossed = leaves_actuator_mode(
-            U, degree, mode, on_limit, standing > 2, low, high, reach, x[n - 1], slope, size[0]
+        exit_at, entered, crossed, left = leaves_actuator_mode(
+            U, degree, mode, on_limit, roots, standing > 2, low, high, reach, x[n - 1], slope, size[0]
         )
         late_next = 0.0
         if exit_at >= 0 or whole:
@@ -254,7 +259,7 @@ def integrate(
                     V[i, n + 1 + j] = z[n + 1 + k * i + j]
             V[0, : n + 1] = z[: n + 1]
             matter = driven(z, n, filled, size, reach)
-            rows = unsaturated if mode == 0 else (saturated if which == 1 else slewing)
+            rows = (unsaturated if which == 0 else saturated) if side == 0 else (slewing if which == 2 else stopped)
             advance(rows, tables.influence[which, signals:], V, n, matter, most, scale, step, reach, x)
             V[: known + 1, n + 1 :] = 0.0
         if slews:
@@ -272,7 +277,7 @@ def integrate(
         if status == DIVERGED:
             break
 
-        on_limit = crossed
+        on_limit, roots = crossed, left
         if exit_at >= 0:
             if event_count == bounds.events:
                 status = EVENTFUL

@@ -42,6 +42,8 @@ NO_RESETS = Resets(np.zeros(0), np.zeros((0, 0)))
 class SaturatedLoop:
     """x' = A x + B m + D w, u = C x + E w, m = sat(u), w_j(t) = Z_j x(t - delays_j).
 
+    Of an actuator with a rate limit m is its output, and x' = A x + (B - B_limits) m + B_limits sat(u) + D w.
+
     Parameters
     ----------
     A, B, C
@@ -55,6 +57,8 @@ class SaturatedLoop:
         Name -> (row over x (n,), row over w (k,)).
     resets
         Of a reference that is generated piece by piece.
+    B_limits
+        Shape (n,): the part of B that follows sat(u) and not a slower actuator; zeros unless given.
     """
 
     A: np.ndarray
@@ -67,6 +71,7 @@ class SaturatedLoop:
     x0: np.ndarray
     outputs: Mapping[str, tuple[np.ndarray, np.ndarray]]
     resets: Resets = NO_RESETS
+    B_limits: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name in ("A", "B", "C", "D", "E", "Z", "x0"):
@@ -80,14 +85,15 @@ class SaturatedLoop:
 
 
 def with_actuator(loop: SaturatedLoop, start: float) -> SaturatedLoop:
-    """Append a state to a loop, the output of an actuator with a rate limit, which moves nothing by itself."""
+    """Append the states of an actuator with a rate limit, its rate and its output, which move nothing by themselves."""
     return replace(
         loop,
-        A=np.pad(loop.A, (0, 1)),
-        B=np.append(loop.B, 0.0),
-        C=np.append(loop.C, 0.0),
-        D=np.pad(loop.D, ((0, 1), (0, 0))),
-        Z=np.pad(loop.Z, ((0, 0), (0, 1))),
-        x0=np.append(loop.x0, start),
-        outputs={name: (np.append(x, 0.0), w) for name, (x, w) in loop.outputs.items()},
+        A=np.pad(loop.A, (0, 2)),
+        B=np.pad(loop.B, (0, 2)),
+        C=np.pad(loop.C, (0, 2)),
+        D=np.pad(loop.D, ((0, 2), (0, 0))),
+        Z=np.pad(loop.Z, ((0, 0), (0, 2))),
+        x0=np.append(loop.x0, [0.0, start]),
+        outputs={name: (np.pad(x, (0, 2)), w) for name, (x, w) in loop.outputs.items()},
+        B_limits=None if loop.B_limits is None else np.pad(loop.B_limits, (0, 2)),
     )

@@ -39,7 +39,8 @@ class Run:
     events_s, modes
         Every time at which u crosses a limit, located to rounding, and the mode entered: 1 at the upper limit,
         -1 at the lower one, 0 unsaturated. A jump of u across both limits is two events at one time. With a rate limit
-        also every time at which the actuator falls behind, 2 rising and -2 falling, and catches up.
+        also every time at which the actuator falls behind and catches up; while it rises the mode is 3 more, while it
+        falls 3 less.
     """
 
     time_s: np.ndarray
@@ -68,11 +69,24 @@ class Run:
 
 
 def limit_pair(limits: float | Sequence[float]) -> tuple[float, float]:
-    """The lower and the upper limit: of one number +- that; raises InputError when there are not one or two."""
+    """The lower and the upper limit, of one number +- that.
+
+    Raises
+    ------
+    InputError
+        There are not one or two, one is not positive, or of two the first is not below the second.
+    """
     pair = np.atleast_1d(np.asarray(limits, dtype=float))
     if pair.shape not in ((1,), (2,)):
         raise InputError(f"the limits are {shown(limits)}; expected one number, or a lower and an upper one")
-    return (-float(pair[0]), float(pair[0])) if pair.size == 1 else (float(pair[0]), float(pair[1]))
+    if pair.size == 1 and not pair[0] > 0:
+        raise InputError(
+            f"the saturation limit is {pair[0]:g}; expected a positive number, or a lower and an upper one"
+        )
+    low, high = (-float(pair[0]), float(pair[0])) if pair.size == 1 else (float(pair[0]), float(pair[1]))
+    if not low < high:
+        raise InputError(f"the saturation limits are {low:g} and {high:g}; expected the lower one first")
+    return low, high
 
 
 class DivergenceError(InputError):
@@ -107,8 +121,7 @@ def simulate(
         Called some times a second with the seconds of the run done since the last call.
     rate
         The most that the actuator's output m changes in a second, from 0 (or the limit next to it) at t = 0: m is
-        sat(u) as long as it can follow, and moves toward it at the rate when it cannot. What the loop takes for m, and
-        u - m for what the actuator leaves out, is that m.
+        sat(u) as long as it can follow, and moves toward it at the rate when it cannot.
 
     Raises
     ------
@@ -143,9 +156,7 @@ def simulate_watched(
     Stopped
         The watch says so.
     """
-    low, high = limits
-    if not low < high:
-        raise InputError(f"the saturation limits are {low:g} and {high:g}; expected the lower one first")
+    low, high = limit_pair(limits)
     if not rate > 0:
         raise InputError(f"the rate limit is {rate:g} a second; expected a positive number, inf for none")
     increasing = len(time_s) > 0 and time_s[0] >= 0 and time_s[-1] > 0 and np.all(np.diff(time_s) > 0)
@@ -190,8 +201,8 @@ def simulate_watched(
     outputs, m = compiled.reading @ values[1:], values[0]
     if slews and len(events):
         last = np.searchsorted(events, time_s, side="right") - 1
-        moved = places[last] + modes[last] // 2 * rate * (time_s - events[last])
-        m = np.where((last >= 0) & (np.abs(modes[last]) == 2), moved, m)
+        moved = places[last] + np.sign(modes[last]) * rate * (time_s - events[last])
+        m = np.where((last >= 0) & (np.abs(modes[last]) > 1), moved, m)
     return Run(
         time_s=time_s,
         control=values[0],
