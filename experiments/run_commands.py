@@ -42,7 +42,7 @@ _run_options = together(
     "--rate-limit",
     type=float,
     default=math.inf,
-    help="Most change of the actuator in a second, which the controller knows; inf by default.",
+    help="Most change of the actuator in a second, in its unit, unknown to the controller; inf by default.",
 )
 @click.option("--alpha", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
 @click.option("--beta", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")

@@ -58,7 +58,7 @@ class SaturatedLoop:
     resets
         Of a reference that is generated piece by piece.
     B_limits
-        Shape (n,): the part of B that follows sat(u) and not a slower actuator; zeros unless given.
+        Shape (n,): the part of B that follows sat(u) at once, and not a slower actuator; zeros unless given.
     """
 
     A: np.ndarray

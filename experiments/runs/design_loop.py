@@ -55,6 +55,11 @@ def design_loop(
     with 1/(1 + F) = A/Lambda in chapter 2, and v = K e + T_so exp(-T_d s) v in chapter 3: 1 + F is never
     inverted as a block, theta1~ is strictly proper and so is P, and no algebraic loop is left.
 
+    Behind an actuator with a rate limit u_tilde is still u - sat(u), as of a controller that knows the limits only, and
+    y + y_d is no longer the response of the loop without saturation. It would be with u_tilde = u - m, m being what
+    the actuator gives out. But theta1~ is designed for the dead zone, which has no memory, and an actuator that slews
+    lags: with theta1~(0) = -1 runs with u - m ended in limit cycles where those with u - sat(u) settled.
+
           r -->(+)--> K/(1+F) --v-->(+)--> u --> sat --u_m--> P exp(-hs) --> y
                -^                   -^     |                                 |
                 |                    |     +--> u_tilde --> theta1~          |

@@ -52,10 +52,8 @@ def simulate_design(
     plant
         The true plant; the design's own model unless given.
     rate_limit
-        The most that the actuator's output changes in a second, in its unit. The controller knows it, as it knows the
-        limits, and the anti-windup is given u minus what the actuator gives out: then y + y_d remains what the loop
-        without saturation would give. A drive whose computer does not know its actuator's slewing is
-        :func:`experiments.drive.sampled_loop.simulate_sampled`.
+        The most that the actuator's output changes in a second, in its unit. The controller knows the limits and not
+        the rate: u_tilde stays u - sat(u), see :func:`experiments.runs.design_loop.design_loop`.
     disturbances
         At the plant's input and output, and measurement noise.
 

@@ -166,14 +166,14 @@ def test_a_sinusoid_that_is_too_fast_is_left_where_it_is_and_met_again() -> None
 def test_it_is_the_loop_of_a_computer_that_does_not_know_the_slewing(extended_design: Design, kind: str) -> None:
     reference, errors = sinusoid(50.0, 1.5, 0.4), []
     loop = design_loop(extended_design, reference, kind)
-    for rate_hz in (2000.0, 8000.0):
+    for rate_hz in (2000.0, 16000.0):
         drive = Drive(rate_hz, "tustin", (-9.0, 12.0), slew=60.0)
         sampled = simulate_sampled(extended_design, reference, kind, drive, 2.0)
         run = simulate(loop, (-9.0, 12.0), sampled.time_s, rate=60.0)
         errors.append(np.abs(run.outputs["output"] - sampled.output).max())
     slewing = np.abs(run.modes) > 1
     assert slewing.sum() >= 2
-    assert errors[1] < 0.35 * errors[0] < 0.05
+    assert errors[1] < 0.5 * errors[0] < 0.03
 
 
 def test_a_rate_that_nothing_needs_changes_nothing(extended_design: Design) -> None:
