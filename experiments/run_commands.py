@@ -80,6 +80,7 @@ def simulate_command(
     from experiments.runs.disturbances import UNDISTURBED
     from experiments.runs.guarantee import guarantee
     from experiments.runs.metrics import last_saturation
+    from experiments.runs.region import require_within_region
     from experiments.runs.sector_promise import judge_run
 
     limits = asked_limits(limit)
@@ -103,6 +104,7 @@ def simulate_command(
     asked = reference_of(content, **reference)
     disturbances = disturbances_of(until, input_disturbance, output_disturbance, noise, seed)
     true = None if plant is None else asked_model(plant).plant
+    require_within_region(true or content.loop_plant, asked, limits)
     loop = design_loop(content, asked, kind, true, disturbances)
     with tqdm(total=until, desc="simulate", bar_format=SHARE, disable=None, leave=False) as bar:
         run = simulate(loop, limits, time_s, bar.update, rate_limit)
@@ -189,6 +191,7 @@ def sampled_command(
     from experiments.drive.sampled_loop import Drive, simulate_sampled
     from experiments.runs.disturbances import UNDISTURBED
     from experiments.runs.guarantee import guarantee
+    from experiments.runs.region import require_within_region
     from experiments.runs.sector_promise import steady_control, verdict
 
     drive = Drive(rate, method, asked_limits(limit), quantum, slew, input_delay, resolution)
@@ -200,6 +203,7 @@ def sampled_command(
     asked = reference_of(content, **reference)
     disturbances = disturbances_of(until, input_disturbance, output_disturbance, noise, seed)
     true = None if plant is None else asked_model(plant).plant
+    require_within_region(true or content.loop_plant, asked, drive.limits)
     with tqdm(total=until * rate, desc="sampled", bar_format=SHARE, disable=None, leave=False) as bar:
         run = simulate_sampled(content, asked, kind, drive, until, true, bar.update, disturbances, form)
     low, high = drive.limits
