@@ -100,18 +100,19 @@ class Reference:
         """:attr:`period_s`, which is finite, to 80 digits."""
         return 2 * PI / Fraction(min(omega for omega in self.omegas if omega > 0))
 
-    def required(self, plant: PlantModel) -> Peak:
-        """The most that the control reaches which keeps the plant's output on r in the steady state, in its input unit.
+    def required(self, plant: PlantModel, middle: float = 0.0) -> Peak:
+        """The most that the control which keeps the plant's output on r in the steady state is away from ``middle``.
 
-        It is the control (r/P)(t) = sum of amplitude_i/|P(j omega_i)| sin(omega_i t + phase_i - arg P(j omega_i)) and
-        what r's constant and slope take, see :func:`experiments.runs.steady_control.steady_constant`; infinite where
-        that grows for ever. See :func:`experiments.runs.steady_control.peak`.
+        In the plant's input unit. It is the control (r/P)(t) = sum of amplitude_i/|P(j omega_i)| sin(omega_i t +
+        phase_i - arg P(j omega_i)) and what r's constant and slope take, see
+        :func:`experiments.runs.steady_control.steady_constant`; infinite where that grows for ever. See
+        :func:`experiments.runs.steady_control.peak`.
         """
         parts = list(zip(self.amplitudes, self.omegas, self.phases_rad, strict=True))
         constants = [self.offset, *(a * math.sin(phase) for a, omega, phase in parts if omega == 0)]
         constant = steady_constant(plant, math.fsum(constants), self.slope)
         doubt = steady_constant(plant, 4 * UNIT * sum(map(abs, constants)), 0.0)
-        return peak([response(plant, *part) for part in parts if part[1] > 0], constant, abs(doubt))
+        return peak([response(plant, *part) for part in parts if part[1] > 0], constant - middle, abs(doubt))
 
     def generator(self) -> Generator:
         """Its oscillators, and a constant with its integral."""
