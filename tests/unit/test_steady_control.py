@@ -87,6 +87,33 @@ def test_constants_and_slopes() -> None:
     assert Reference((0.0,), (0.0,), (0.0,), 4.0).required(PLANT).value == 0.0
 
 
+def test_zeros_at_zero_and_in_the_right_half_plane() -> None:
+    """A constant takes an integral of it, a sinusoid its amplitude over |P|, on whichever side the zeros lie."""
+    velocity = PlantModel(2.0, (), (Mode(5.0, 0.2),), 0.4, -1)
+    for level, slope in ((1e-9, 0.0), (0.0, 1e-9)):
+        assert Reference((3.0,), (1.0,), (0.4,), level, slope).required(velocity) == (math.inf, math.inf)
+    assert sinusoid(3.0, 1.0, 0.4, 0.0).required(velocity).value == pytest.approx(3.0 / abs(complex(velocity(1j))))
+    one, other = (
+        PlantModel(2.0, (Mode(3.0, zeta),), (), 0.1, 2, (rate,), (8.0,)) for zeta, rate in ((2.0, 4.0), (-2.0, -4.0))
+    )
+    reference = Reference((3.0, 1.0), (1.0, 3.0), (0.4, 0.0), 5.0, 7.0)  # a double integrator keeps its speed
+    time_s = np.linspace(0, 2 * math.pi, 100_001)
+    for plant in (one, other):
+        seen = np.abs(steady(reference, plant, time_s)).max()
+        found = reference.required(plant)
+        assert seen * (1 - 1e-9) <= found.value <= found.at_most <= seen * (1 + 1e-6)
+
+
+def test_distance_from_a_middle_and_constants_that_cancel() -> None:
+    """From the middle of unequal limits; of constants that cancel the bound keeps what their rounding may be."""
+    plant = PlantModel(2.0, (), (), 0.0, 0, (), (5.0,))
+    wave = 3.0 / abs(complex(plant(1j)))
+    assert sinusoid(3.0, 1.0, 0.0, 4.0).required(plant, 1.5).value == pytest.approx(wave + 0.5)
+    assert sinusoid(3.0, 1.0, 0.0, 4.0).required(plant, 3.0).value == pytest.approx(wave + 1.0)
+    found = Reference((1e12, 1.0), (0.0, 1.0), (math.pi / 6, 0.0), -5e11).required(plant)
+    assert found.at_most - found.value > 1e-5
+
+
 def test_no_error_is_forced_from_the_true_peak_on() -> None:
     """The peak is 7 % and more below the sum of the amplitudes; what a linear program would leave open there is 0."""
     reference = Reference((50.0, 20.0), (1.5, 4.5), (math.pi / 2, math.pi / 2), 0.0)
