@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from design.choices import METHODS, ROBUST_LEVEL, SECTOR
+from design.choices import GUARANTEES, METHODS, ROBUST_LEVEL, SECTOR
 from identification.base.command_line import CommandGroup, together
 from identification.base.digits import lower_end, upper_end
 from identification.base.errors import InputError
@@ -37,12 +37,16 @@ corrected_options = together(
         help="Corrected anti-windup: most time in s for y_d to fall to 1 %; that of the loop itself unless given.",
     ),
     click.option(
+        "--guarantee",
+        type=click.Choice(GUARANTEES),
+        help="Corrected anti-windup: global, whatever the control; robust, so for every plant within W_a; sector, up "
+        "to a control. Global unless given, or sector where the plant allows no other.",
+    ),
+    click.option(
         "--sector",
         type=float,
-        default=SECTOR,
-        show_default=True,
-        help="Corrected anti-windup: sector of the circle criterion, below 1; |u| may reach "
-        "(limit - sector V)/(1 - sector), V the control that the reference takes.",
+        help="Of --guarantee sector: k of the circle criterion, below 1; |u| may reach (limit - k V)/(1 - k), V the "
+        f"control that the reference takes; {SECTOR:g} unless given.",
     ),
     click.option(
         "--bandwidth",
@@ -60,21 +64,33 @@ def main() -> None:
 
 @main.command("delay-free")
 @click.argument("model")
-@click.option("--period", type=float, required=True, help="Period of the sinusoidal reference in seconds.")
 @click.option(
-    "--epsilon",
+    "--period",
+    "periods",
     type=float,
+    multiple=True,
     required=True,
-    help="Of the factor s^2 + epsilon of Lambda, rad^2/s^2.",
+    help="Period of the sinusoidal reference in seconds; once for each sinusoid.",
+)
+@click.option(
+    "--epsilon", type=float, help="Of the factor s^2 + epsilon of Lambda, rad^2/s^2; constants are held nearly."
+)
+@click.option(
+    "--integral-action",
+    is_flag=True,
+    help="Ours, in place of --epsilon: constant references and constant disturbances at the plant's input leave no "
+    "error; the plant's integrators are not hidden.",
 )
 @corrected_options
 @OUTPUT
 def delay_free(
     model: str,
-    period: float,
-    epsilon: float,
+    periods: tuple[float, ...],
+    epsilon: float | None,
+    integral_action: bool,
     recovery: float | None,
-    sector: float,
+    guarantee: str | None,
+    sector: float | None,
     bandwidth: float | None,
     output: Path,
 ) -> None:
@@ -82,11 +98,19 @@ def delay_free(
     from design.asked_model import asked_model
     from design.chapter_2.design_delay_free import design_delay_free
 
+    if (epsilon is None) != integral_action:
+        found = "both are given" if integral_action else "none is given"
+        raise InputError(f"of --epsilon and --integral-action {found}; expected one of them")
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
-    design = design_delay_free(given, period, epsilon, recovery, sector, bandwidth)
+    design = design_delay_free(given, periods, epsilon, recovery, sector, bandwidth, guarantee)
     hinf = design.hinf
     assert hinf is not None
+    hidden = 0 if integral_action else given.plant.integrators
+    drift = (
+        f"\n  C hides {'the integrator' if hidden == 1 else 'both integrators'} of the plant: y drifts under a "
+        "constant disturbance at its input; --integral-action prevents that"
+    )
     unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
     _finish(
         design,
@@ -94,7 +118,7 @@ def delay_free(
         output,
         f"H-infinity stabiliser: ||[W1 S; W2 T]|| = {upper_end(hinf.gamma, 4)}, no stabilising controller below "
         f"{lower_end(hinf.gamma_lower, 4)}; every closed-loop pole left of -{lower_end(hinf.decay_rate, 4)} 1/s"
-        f"{unstable}",
+        f"{unstable}{drift if hidden else ''}",
     )
 
 
@@ -135,7 +159,8 @@ def extended(
     inverse_epsilon: float,
     robust_level: float | None,
     recovery: float | None,
-    sector: float,
+    guarantee: str | None,
+    sector: float | None,
     bandwidth: float | None,
     output: Path,
 ) -> None:
@@ -167,6 +192,7 @@ def extended(
         recovery,
         sector,
         bandwidth,
+        guarantee,
     )
     poles = ", ".join(f"{pole:.4g}" for pole in design.blocks["T_so"].poles)
     _finish(design, model, output, "\n  ".join((*design.free.reasons, f"T_so has the poles {poles}")))
@@ -220,6 +246,7 @@ def audit_command(design: Path, windup: float) -> None:
         raise InputError(f"--windup is {windup:g}; expected a number of less than 1e100")
     content = read_design(design)
     click.echo(audit_text(content, audit(content), windup))
+    click.echo(f"\n{_compared(content)}")
 
 
 def _coefficients(text: str, option: str) -> list[float]:
@@ -235,6 +262,7 @@ def _coefficients(text: str, option: str) -> list[float]:
 def _finish(design: Design, model: str, output: Path, summary: str) -> None:
     text = design.to_json()
     write_whole({output: lambda path: path.write_text(text, encoding="utf-8")}, inputs=[Path(model)])
+    click.echo(_compared(design))
     click.echo(f"{design.kind} design -> {output}")
     click.echo(f"  {summary}")
     for name, each in design.anti_windup.items():
@@ -242,6 +270,16 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
         sector = "any" if judged.popov_sector is None else lower_end(judged.popov_sector, 4)
         stable = "stable" if judged.theta2_stable else "NOT stable: a lasting offset after saturation"
         click.echo(f"  anti-windup {name:9s} f = {judged.f:.4g}, Popov sector {sector}, theta2 {stable}")
+
+
+def _compared(design: Design) -> str:
+    """What each anti-windup does beside none in one run, the one that does harm first; or why there is no run."""
+    from experiments.runs.against_none import against_none
+
+    try:
+        return str(against_none(design))
+    except InputError as error:
+        return f"not compared with no anti-windup: {error}"
 
 
 if __name__ == "__main__":

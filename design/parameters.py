@@ -17,13 +17,13 @@ class DelayFreeParameters:
     Parameters
     ----------
     period_s
-        Of the sinusoidal reference in seconds.
+        The longest period of the reference in seconds.
     epsilon
-        Of the factor s^2 + epsilon of Lambda, in rad^2/s^2.
+        Of the factor s^2 + epsilon of Lambda, in rad^2/s^2; None for integral action.
     """
 
     period_s: float
-    epsilon: float
+    epsilon: float | None
 
     def to_dict(self) -> dict[str, Any]:
         """The ``parameters`` of design.json."""
@@ -95,6 +95,12 @@ class ExtendedParameters:
     Q: Mapping[str, Quotient | str]
     roll_off: RollOff | None = None
     reasons: tuple[str, ...] = ()
+
+    @property
+    def pace(self) -> float:
+        """a, or the rate of the roll-off where it is slower, rad/s."""
+        roll_off = self.roll_off
+        return self.a if roll_off is None or not roll_off.order else min(self.a, roll_off.rate)
 
     def to_dict(self) -> dict[str, Any]:
         """The ``parameters`` of design.json."""

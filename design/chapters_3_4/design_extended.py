@@ -15,10 +15,11 @@ from design.chapters_3_4.interpolate_Q import Conditions, StableFunction, by_pol
 from design.chapters_3_4.robust_roll_off import require_possible, robust_outer_part
 from design.chapters_3_4.smith_predictor import free_part, free_part_of, stabiliser, thesis_factors
 from design.chapters_3_4.tracking import TrackingConditions, tracking_conditions
-from design.choices import ROBUST_LEVEL, SECTOR
+from design.choices import ROBUST_LEVEL
 from design.design_file import Design
 from design.parameters import ExtendedParameters, Quotient, RollOff
-from design.stability.margins import tracking_floor
+from design.stability.delay_loop import DelayLoop
+from design.stability.margins import robustness_of, tracking_floor
 from identification.base.errors import InputError
 from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
@@ -36,8 +37,9 @@ def design_extended(
     inverse_epsilon: float = 0.0,
     robust_level: float | None = None,
     recovery_s: float | None = None,
-    sector: float = SECTOR,
+    sector: float | None = None,
     bandwidth: float | None = None,
+    guarantee: str | None = None,
 ) -> Design:
     """Chapters 3 and 4 for every plant: T_so, T_si, F1, F2, K, theta1~ and theta2.
 
@@ -65,9 +67,9 @@ def design_extended(
         T_so rolls off as late as ||W_a C S|| <= robust_level < 1 allows, see
         :func:`design.chapters_3_4.robust_roll_off.robust_outer_part`. Unless given it is
         :data:`design.choices.ROBUST_LEVEL`, and T_so of the thesis's class with a given a does not roll off.
-    recovery_s, sector, bandwidth
+    recovery_s, sector, bandwidth, guarantee
         Of the corrected anti-windup, see :func:`design.anti_windup.judge.compensators`; unless given, the recovery
-        takes no longer than exp(-a t) takes to 1 %.
+        takes no longer than exp(-a t) takes to 1 %, or the roll-off where it is slower.
 
     Raises
     ------
@@ -78,7 +80,7 @@ def design_extended(
     plant, bound = model.plant, model.additive_bound
     omegas = tuple(float(omega) for omega in reference_omegas)
     own_level = robust_level is None and a is not None
-    as_printed = own_level and _has_free_part(plant) and (plant.relative_degree == 1 or inverse_epsilon > 0)
+    as_printed = own_level and is_of_thesis_class(plant) and (plant.relative_degree == 1 or inverse_epsilon > 0)
     if not as_printed and (method != "zeros" or inverse_epsilon):
         raise InputError(
             "a design with a roll-off, or of a chosen a, is by the zeros of Q with the exact inverse; found "
@@ -91,8 +93,12 @@ def design_extended(
         T_so, parameters = _rolled_off(model, omegas, a, pairs, level)
     K = stabiliser(plant, T_so, inverse_epsilon)
     T_si, P_o = inner_outer(plant)
-    own_s = float(np.log(1 / SETTLED)) / parameters.a
-    thesis, corrected = compensators(plant, bound, own_s, recovery_s, sector, bandwidth)
+    own_s = float(np.log(1 / SETTLED)) / parameters.pace
+    robustness = robustness_of(DelayLoop(plant_block(plant), K, (T_so * T_si).without_delay(), plant.delay_s), bound)
+    measured = model.fit.band[1] if model.fit else None
+    thesis, corrected = compensators(
+        plant, bound, own_s, recovery_s, sector, bandwidth, guarantee, robustness, measured
+    )
     blocks = {
         "T_so": T_so,
         "T_si": T_si,
@@ -104,7 +110,7 @@ def design_extended(
         "theta1_tilde": thesis.kind.theta1_tilde,
         "theta2": thesis.kind.theta2(plant),
     }
-    if _has_free_part(plant):
+    if is_of_thesis_class(plant):
         free = free_part_of(T_so, parameters.a)
         K_0, K_1 = thesis_factors(plant, T_so, inverse_epsilon)
         blocks = {"Q": free.Q, "C0": free.C_0, "K0": K_0, "K1": K_1} | blocks
@@ -121,8 +127,8 @@ def design_extended(
     )
 
 
-def _has_free_part(plant: PlantModel) -> bool:
-    """Whether C_0 is for 1/s, Thesis Eq. (2.20): one integrator, and no other root in Re s >= 0."""
+def is_of_thesis_class(plant: PlantModel) -> bool:
+    """Whether a plant has one integrator and no other root in Re s >= 0, Thesis Eq. (2.20): then C_0 is for 1/s."""
     return plant.integrators == 1 and not plant.right_zeros and not plant.unstable_poles
 
 
@@ -145,9 +151,10 @@ def _rolled_off(
     """T_so of any plant, which rolls off as late as W_a allows."""
     plant, bound = model.plant, model.additive_bound
     wanted, reasons = _possible(plant, bound, omegas, level)
+    order = None
     if a is None:
         pace = chosen_pace(plant, bound, wanted, level, model.fit.band[1] if model.fit else None)
-        a = pace.a
+        a, order = pace.a, pace.order
         reasons.append(f"a = {a:.4g} rad/s: {pace.reason}")
     if pairs is None:
         pairs = pairs_of(a, wanted.omegas)
@@ -155,14 +162,14 @@ def _rolled_off(
             f"e = {e:.4g} rad/s, f = {f:.4g} rad^2/s^2: poles of real part -a, no slower than the sinusoid"
             for e, f in pairs
         ]
-    found = robust_outer_part(plant, bound, wanted, a, fixed_poles(wanted, a, pairs), level)
+    found = robust_outer_part(plant, bound, wanted, a, fixed_poles(wanted, a, pairs), level, order)
     poles = "one pole" if found.order == 1 else f"{found.order} poles"
     reasons.append(
         f"T_so rolls off with {poles} at {found.rate:.4g} rad/s: the latest found with |W_a C S| <= {level:g}"
         if found.order
         else f"T_so needs no roll-off: |W_a C S| is at most {found.peak:.3g} <= {level:g} as it is"
     )
-    own = _designs(conditions(omegas, plant.delay_s, a), pairs) if _has_free_part(plant) else {}
+    own = _designs(conditions(omegas, plant.delay_s, a), pairs) if is_of_thesis_class(plant) else {}
     roll_off = RollOff(level, found.order, found.rate)
     return found.T_so, ExtendedParameters(a, tuple(pairs), "zeros", 0.0, _tried(own), roll_off, tuple(reasons))
 

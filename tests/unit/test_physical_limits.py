@@ -239,7 +239,7 @@ def test_table_of_the_start_from_rest_falls_and_is_finest_where_it_falls() -> No
 @pytest.mark.parametrize(
     ("plant", "reference", "limit", "words"),
     [
-        (PlantModel(-2.0, (), (), 0.1, 0), CHAPTER_4, 1.0, "the plant is the gain -2 and a dead time"),
+        (PlantModel(-2.0, (), (), 0.1, 0), CHAPTER_4, 1.0, "the plant is the gain -2, whose least error"),
         (PlantModel(1.0, (), (Mode(5.0, -0.1),), 0.0, 0), CHAPTER_4, 1.0, "of real part 0.5 rad/s; expected none"),
         (integrator(1.0), CHAPTER_4, (2.0, -3.0), "the limit is 2 -3; expected a positive finite number, or a lower"),
         (integrator(1.0), CHAPTER_4, (0.0, 3.0), "the limit is 0 3, so that a plant with an integrator drifts"),
