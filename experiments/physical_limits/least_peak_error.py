@@ -216,8 +216,8 @@ def harmonic(plant: PlantModel, reference: Reference) -> Reference:
         )
     if not (plant.pole_modes or plant.real_poles or plant.integrators > 0):
         raise InputError(
-            f"the plant is the gain {plant.gain:.4g}, whose least error is that by which r leaves {plant.gain:.4g} times "
-            "the limits; expected a plant with a pole"
+            f"the plant is the gain {plant.gain:.4g}, whose least error is that by which r leaves so many times the "
+            "limits; expected a plant with a pole"
         )
     if reference.slope:
         raise InputError(f"the reference has the slope {reference.slope:g} a second; expected a periodic one")

@@ -82,6 +82,12 @@ class Reference:
         return float(sum(abs(a) * omega**2 for a, omega in zip(self.amplitudes, self.omegas, strict=True)) * (1 + 1e-9))
 
     @property
+    def constants(self) -> tuple[float, ...]:
+        """The offset, and the sinusoids of frequency 0, in the plant's output unit."""
+        parts = zip(self.amplitudes, self.omegas, self.phases_rad, strict=True)
+        return (self.offset, *(a * math.sin(phase) for a, omega, phase in parts if omega == 0))
+
+    @property
     def amplitude(self) -> float:
         """The sum of the amplitudes' sizes, in the plant's output unit: the scale of every band.
 
@@ -109,9 +115,8 @@ class Reference:
         :func:`experiments.runs.steady_control.peak`.
         """
         parts = list(zip(self.amplitudes, self.omegas, self.phases_rad, strict=True))
-        constants = [self.offset, *(a * math.sin(phase) for a, omega, phase in parts if omega == 0)]
-        constant = steady_constant(plant, math.fsum(constants), self.slope)
-        doubt = steady_constant(plant, 4 * UNIT * sum(map(abs, constants)), 0.0)
+        constant = steady_constant(plant, math.fsum(self.constants), self.slope)
+        doubt = steady_constant(plant, 4 * UNIT * sum(map(abs, self.constants)), 0.0)
         return peak([response(plant, *part) for part in parts if part[1] > 0], constant - middle, abs(doubt))
 
     def generator(self) -> Generator:

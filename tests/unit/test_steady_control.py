@@ -8,10 +8,16 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from design.chapters_3_4.design_extended import design_extended
+from experiments.engine.simulate import simulate
 from experiments.physical_limits.intervals import Interval
 from experiments.physical_limits.least_peak_error import periodic_limit
+from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference, sinusoid
+from experiments.runs.sector_promise import steady_control
 from experiments.runs.steady_control import Wave, peak
+from identification.model.additive_bound import AdditiveBound
+from identification.model.model_file import IdentifiedModel
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 
@@ -123,3 +129,27 @@ def test_no_error_is_forced_from_the_true_peak_on() -> None:
     assert periodic_limit(PLANT, reference, found.at_most) == Interval(0.0, 0.0)
     below = periodic_limit(PLANT, reference, 0.93 * found.value)
     assert 0 < below.lower < below.upper
+
+
+@pytest.mark.parametrize(
+    ("plant", "level"),
+    [
+        (PlantModel(5.0, (), (), 0.02, 0, (), (3.0,)), 1.5),
+        (PlantModel(5.0, (), (), 0.02, 1, (-20.0,), (10.0, 30.0)), 1.5),
+        (PlantModel(5.0, (), (Mode(60.0, 0.05),), 0.02, 2), 1.5),
+        (PlantModel(50.0, (), (Mode(10.0, 0.3),), 0.01, -1), 0.0),
+    ],
+)
+def test_the_control_of_a_loop_settles_at_it(plant: PlantModel, level: float) -> None:
+    """Around plants with 0, 1 and 2 integrators, a zero at s = 0 and one in the right half plane."""
+    bound = AdditiveBound(0.1 * abs(complex(plant(20j))), (), (), (), (100.0,))
+    omegas = (0.0, 4.0) if level else (4.0,)
+    design = design_extended(IdentifiedModel(plant, bound), omegas)
+    amplitudes, phases = ((0.5, 2.0), (math.pi / 2, 0.3)) if level else ((2.0,), (0.3,))
+    reference = Reference(amplitudes, omegas, phases, 2 * level / 3)
+    time_s = np.linspace(0.0, 30.0, 1501)
+    run = simulate(design_loop(design, reference, None), (-np.inf, np.inf), time_s)
+    late = time_s > 25
+    settled = steady_control(reference, plant, time_s)[late]
+    np.testing.assert_allclose(run.control[late], settled, atol=1e-8 * np.abs(settled).max())
+    assert np.abs(settled).max() == pytest.approx(reference.required(plant).value, rel=1e-3)
