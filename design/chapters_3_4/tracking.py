@@ -140,7 +140,7 @@ def _numerator(wanted: TrackingConditions, poles: Sequence[complex]) -> tuple[fl
         z = number(point) / unit
         series = _target(wanted, poles, number(point), multiplicity)
         for j in range(multiplicity):
-            rows.append(_powers(z, j, wanted.count))
+            rows.append(powers(z, j, wanted.count))
             values.append([series[j] * unit**j])
     found = acb_mat(rows).solve(acb_mat(values))
     coefficients = [found[k, 0].real for k in range(wanted.count)]
@@ -150,7 +150,7 @@ def _numerator(wanted: TrackingConditions, poles: Sequence[complex]) -> tuple[fl
     return float(coefficients[-1] / unit ** (len(coefficients) - 1)), zeros
 
 
-def _powers(z: acb, j: int, count: int) -> list[acb]:
+def powers(z: acb, j: int, count: int) -> list[acb]:
     """The j-th Taylor coefficient at z of 1, x, x^2, ..."""
     return [comb(k, j) * z ** (k - j) if k >= j else acb(0) for k in range(count)]
 
@@ -202,7 +202,7 @@ class RolledOff:
         for point, multiplicity in wanted.points:
             series = _target(wanted, poles, number(point), multiplicity)
             self._series.append((point, np.array([complex(term) for term in series])))
-            rows += [_powers(number(point) / self.unit, j, wanted.count) for j in range(multiplicity)]
+            rows += [powers(number(point) / self.unit, j, wanted.count) for j in range(multiplicity)]
         inverse = acb_mat(rows).inv()
         count = range(wanted.count)
         self._basis = np.array([[complex(inverse[k, i]) for i in count] for k in count])
