@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from design.choices import METHODS, SECTOR
+from design.choices import GUARANTEES, METHODS, ROBUST_LEVEL, SECTOR
 from identification.base.command_line import CommandGroup, together
 from identification.base.digits import lower_end, upper_end
 from identification.base.errors import InputError
@@ -37,12 +37,16 @@ corrected_options = together(
         help="Corrected anti-windup: most time in s for y_d to fall to 1 %; that of the loop itself unless given.",
     ),
     click.option(
+        "--guarantee",
+        type=click.Choice(GUARANTEES),
+        help="Corrected anti-windup: global, whatever the control; robust, so for every plant within W_a; sector, up "
+        "to a control. Global unless given, or sector where the plant allows no other.",
+    ),
+    click.option(
         "--sector",
         type=float,
-        default=SECTOR,
-        show_default=True,
-        help="Corrected anti-windup: sector of the circle criterion, below 1; |u| may reach "
-        "(limit - sector V)/(1 - sector), V the control that the reference takes.",
+        help="Of --guarantee sector: k of the circle criterion, below 1; |u| may reach (limit - k V)/(1 - k), V the "
+        f"control that the reference takes; {SECTOR:g} unless given.",
     ),
     click.option(
         "--bandwidth",
@@ -60,21 +64,33 @@ def main() -> None:
 
 @main.command("delay-free")
 @click.argument("model")
-@click.option("--period", type=float, required=True, help="Period of the sinusoidal reference in seconds.")
 @click.option(
-    "--epsilon",
+    "--period",
+    "periods",
     type=float,
+    multiple=True,
     required=True,
-    help="Of the factor s^2 + epsilon of Lambda, rad^2/s^2.",
+    help="Period of the sinusoidal reference in seconds; once for each sinusoid.",
+)
+@click.option(
+    "--epsilon", type=float, help="Of the factor s^2 + epsilon of Lambda, rad^2/s^2; constants are held nearly."
+)
+@click.option(
+    "--integral-action",
+    is_flag=True,
+    help="Ours, in place of --epsilon: constant references and constant disturbances at the plant's input leave no "
+    "error; the plant's integrators are not hidden.",
 )
 @corrected_options
 @OUTPUT
 def delay_free(
     model: str,
-    period: float,
-    epsilon: float,
+    periods: tuple[float, ...],
+    epsilon: float | None,
+    integral_action: bool,
     recovery: float | None,
-    sector: float,
+    guarantee: str | None,
+    sector: float | None,
     bandwidth: float | None,
     output: Path,
 ) -> None:
@@ -82,11 +98,19 @@ def delay_free(
     from design.asked_model import asked_model
     from design.chapter_2.design_delay_free import design_delay_free
 
+    if (epsilon is None) != integral_action:
+        found = "both are given" if integral_action else "none is given"
+        raise InputError(f"of --epsilon and --integral-action {found}; expected one of them")
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
-    design = design_delay_free(given, period, epsilon, recovery, sector, bandwidth)
+    design = design_delay_free(given, periods, epsilon, recovery, sector, bandwidth, guarantee)
     hinf = design.hinf
     assert hinf is not None
+    hidden = 0 if integral_action else given.plant.integrators
+    drift = (
+        f"\n  C hides {'the integrator' if hidden == 1 else 'both integrators'} of the plant: y drifts under a "
+        "constant disturbance at its input; --integral-action prevents that"
+    )
     unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
     _finish(
         design,
@@ -94,7 +118,7 @@ def delay_free(
         output,
         f"H-infinity stabiliser: ||[W1 S; W2 T]|| = {upper_end(hinf.gamma, 4)}, no stabilising controller below "
         f"{lower_end(hinf.gamma_lower, 4)}; every closed-loop pole left of -{lower_end(hinf.decay_rate, 4)} 1/s"
-        f"{unstable}",
+        f"{unstable}{drift if hidden else ''}",
     )
 
 
@@ -105,10 +129,10 @@ def delay_free(
     "omegas",
     type=float,
     multiple=True,
-    required=True,
     help="Angular frequency of the reference, rad/s; once for each; 0 is a constant.",
 )
-@click.option("--a", type=float, required=True, help="Closed-loop pole of the free part, rad/s.")
+@click.option("--reference-hz", "hertz", type=float, multiple=True, help="The same in Hz.")
+@click.option("--a", type=float, help="Closed-loop pole of the free part, rad/s; as fast as W_a allows unless given.")
 @click.option("--e", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
 @click.option("--f", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
 @click.option("--method", type=click.Choice(METHODS), default="zeros", show_default=True, help="How Q is designed.")
@@ -116,47 +140,62 @@ def delay_free(
     "--inverse-epsilon", type=float, default=0.0, show_default=True, help="Of R_eps^-1 = R_0^-1/(1 + eps s)^2 (3.2), s."
 )
 @click.option(
-    "--robust-level", type=float, help="Let T_so roll off as late as ||W_a C S|| <= LEVEL < 1 allows.", metavar="LEVEL"
+    "--robust-level",
+    type=float,
+    metavar="LEVEL",
+    help=f"T_so rolls off as late as |W_a C S| <= LEVEL < 1 allows; {ROBUST_LEVEL:g} where --a is not given, or the "
+    "plant is outside the thesis's class.",
 )
 @corrected_options
 @OUTPUT
 def extended(
     model: str,
     omegas: tuple[float, ...],
-    a: float,
+    hertz: tuple[float, ...],
+    a: float | None,
     e: tuple[float, ...],
     f: tuple[float, ...],
     method: str,
     inverse_epsilon: float,
     robust_level: float | None,
     recovery: float | None,
-    sector: float,
+    guarantee: str | None,
+    sector: float | None,
     bandwidth: float | None,
     output: Path,
 ) -> None:
-    """Chapters 3 and 4: Smith predictor based controller and anti-windup with the exact dead time."""
+    """Chapters 3 and 4: controller and anti-windup with the exact dead time, for every plant.
+
+    With --reference-hz 0.5 alone the rest is chosen from the reference, the dead time and W_a, and said.
+    """
+    from math import tau
+
     from design.asked_model import asked_model
     from design.chapters_3_4.design_extended import design_extended
 
     if len(e) != len(f):
         raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected as many")
-    pairs = list(zip(e, f, strict=True))
+    if not omegas and not hertz:
+        raise InputError(
+            "no frequency of the reference is given; expected --reference-hz or --reference-omega, 0 for a constant"
+        )
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
     design = design_extended(
         given,
-        omegas,
+        (*omegas, *(tau * frequency for frequency in hertz)),
         a,
-        pairs,
+        list(zip(e, f, strict=True)) or None,
         method,
         inverse_epsilon,
         robust_level,
         recovery,
         sector,
         bandwidth,
+        guarantee,
     )
     poles = ", ".join(f"{pole:.4g}" for pole in design.blocks["T_so"].poles)
-    _finish(design, model, output, f"Q designed by its {method}; closed loop with 1/s has the poles {poles}")
+    _finish(design, model, output, "\n  ".join((*design.free.reasons, f"T_so has the poles {poles}")))
 
 
 @main.command("anti-windup")
@@ -207,6 +246,7 @@ def audit_command(design: Path, windup: float) -> None:
         raise InputError(f"--windup is {windup:g}; expected a number of less than 1e100")
     content = read_design(design)
     click.echo(audit_text(content, audit(content), windup))
+    click.echo(f"\n{_compared(content)}")
 
 
 def _coefficients(text: str, option: str) -> list[float]:
@@ -222,6 +262,7 @@ def _coefficients(text: str, option: str) -> list[float]:
 def _finish(design: Design, model: str, output: Path, summary: str) -> None:
     text = design.to_json()
     write_whole({output: lambda path: path.write_text(text, encoding="utf-8")}, inputs=[Path(model)])
+    click.echo(_compared(design))
     click.echo(f"{design.kind} design -> {output}")
     click.echo(f"  {summary}")
     for name, each in design.anti_windup.items():
@@ -229,6 +270,16 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
         sector = "any" if judged.popov_sector is None else lower_end(judged.popov_sector, 4)
         stable = "stable" if judged.theta2_stable else "NOT stable: a lasting offset after saturation"
         click.echo(f"  anti-windup {name:9s} f = {judged.f:.4g}, Popov sector {sector}, theta2 {stable}")
+
+
+def _compared(design: Design) -> str:
+    """What each anti-windup does beside none in one run, the one that does harm first; or why there is no run."""
+    from experiments.runs.against_none import against_none
+
+    try:
+        return str(against_none(design))
+    except InputError as error:
+        return f"not compared with no anti-windup: {error}"
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from design.anti_windup.compensator import AntiWindup
 from design.anti_windup.judge import Compensator, CorrectedCompensator, PrintedCompensator
 from design.blocks.block import Block, plant_denominator
+from design.blocks.inner_outer import inner_outer
 from design.hinf.mixed_sensitivity import Synthesis
 from design.parameters import DelayFreeParameters, ExtendedParameters
 from identification.base.errors import InputError, shown
@@ -110,11 +111,12 @@ class Design:
     def controller_parts(self) -> tuple[Block, Block]:
         """The blocks of C = forward/(1 - feedback exp(-h s)) with h the plant's dead time, (3.10) and (3.31).
 
-        Chapter 2: K A/Lambda, no feedback. Chapters 3 and 4: K and T_so.
+        Chapter 2: K A/Lambda, no feedback. Chapters 3 and 4: K and T_so B, with the inner factor B of the plant's zeros
+        in the right half plane, which the thesis's class has not.
         """
         if self.kind == "delay-free":
             return self.blocks["K"] * plant_denominator(self.plant) * self.blocks["Lambda"].inverse(), Block(0.0)
-        return self.blocks["K"], self.blocks["T_so"]
+        return self.blocks["K"], self.blocks["T_so"] * inner_outer(self.plant)[0].without_delay()
 
     def to_json(self) -> str:
         """The text of design.json; every number is finite or this raises ValueError."""
@@ -171,7 +173,7 @@ def read_design(path: Path | str, kind: str | None = None) -> Design:
         )
         if (hinf is not None) != delay_free:
             raise InputError(f"hinf belongs to a delay-free design and to no other; kind is '{design.kind}'")
-        needed = ("K", "Lambda", "G_A") if delay_free else ("K", "T_so", "C0")
+        needed = ("K", "Lambda", "G_A") if delay_free else ("K", "T_so")
         for name in needed:
             if name not in design.blocks:
                 raise InputError(f"the block '{name}' is missing")

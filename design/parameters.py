@@ -17,13 +17,13 @@ class DelayFreeParameters:
     Parameters
     ----------
     period_s
-        Of the sinusoidal reference in seconds.
+        The longest period of the reference in seconds.
     epsilon
-        Of the factor s^2 + epsilon of Lambda, in rad^2/s^2.
+        Of the factor s^2 + epsilon of Lambda, in rad^2/s^2; None for integral action.
     """
 
     period_s: float
-    epsilon: float
+    epsilon: float | None
 
     def to_dict(self) -> dict[str, Any]:
         """The ``parameters`` of design.json."""
@@ -84,6 +84,8 @@ class ExtendedParameters:
         What each method gives, or why it gives none.
     roll_off
         None unless the design is for every plant within W_a.
+    reasons
+        Of what was chosen by the design itself, a sentence each.
     """
 
     a: float
@@ -92,6 +94,13 @@ class ExtendedParameters:
     inverse_epsilon: float
     Q: Mapping[str, Quotient | str]
     roll_off: RollOff | None = None
+    reasons: tuple[str, ...] = ()
+
+    @property
+    def pace(self) -> float:
+        """a, or the rate of the roll-off where it is slower, rad/s."""
+        roll_off = self.roll_off
+        return self.a if roll_off is None or not roll_off.order else min(self.a, roll_off.rate)
 
     def to_dict(self) -> dict[str, Any]:
         """The ``parameters`` of design.json."""
@@ -105,6 +114,8 @@ class ExtendedParameters:
             content |= {"robust_level": self.roll_off.level, "roll_off_order": self.roll_off.order}
             if self.roll_off.order:
                 content["roll_off"] = self.roll_off.rate
+        if self.reasons:
+            content["reasons"] = list(self.reasons)
         content["Q"] = {
             name: {"refused": found}
             if isinstance(found, str)
@@ -124,6 +135,7 @@ class ExtendedParameters:
             inverse_epsilon=number(content, "inverse_epsilon"),
             Q={name: _quotient(member(found, name)) for name in found},
             roll_off=_roll_off(content) if "robust_level" in content else None,
+            reasons=_sentences(content),
         )
 
 
@@ -132,6 +144,13 @@ def _pairs(content: Mapping[str, Any]) -> tuple[tuple[float, float], ...]:
     if not isinstance(given, list) or not all(isinstance(pair, list) and len(pair) == 2 for pair in given):
         raise InputError(f"'pairs' is {shown(given)}; expected a list of pairs of numbers")
     return tuple((number({"pairs": e}, "pairs"), number({"pairs": f}, "pairs")) for e, f in given)
+
+
+def _sentences(content: Mapping[str, Any]) -> tuple[str, ...]:
+    given = content.get("reasons", [])
+    if not isinstance(given, list) or not all(isinstance(sentence, str) for sentence in given):
+        raise InputError(f"'reasons' is {shown(given)}; expected a list of sentences")
+    return tuple(given)
 
 
 def _quotient(content: Mapping[str, Any]) -> Quotient | str:

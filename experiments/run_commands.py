@@ -187,7 +187,7 @@ def sampled_command(
     disturbances = disturbances_of(until, input_disturbance, output_disturbance, noise, seed)
     true = None if plant is None else asked_model(plant).plant
     with tqdm(total=until * rate, desc="sampled", bar_format=SHARE, disable=None, leave=False) as bar:
-        run = simulate_sampled(content, asked, kind, drive, until, true, bar.update, disturbances)
+        run = simulate_sampled(content, asked, kind, drive, until, true, bar.update, disturbances=disturbances)
     low, high = drive.limits
     beyond = run.time_s[(run.control < low) | (run.control > high)]
     last = f", the last at {beyond[-1]:.6g} s" if len(beyond) else ""

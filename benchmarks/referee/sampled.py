@@ -35,7 +35,7 @@ def check(case: Case) -> list[Finding]:
         slew=limit * rate * float(10 ** random.uniform(-2, 0)) if random.random() < 0.3 else math.inf,
         input_delay_s=float(random.choice([0.0, 1.0, random.uniform(0, 3)])) / rate,
     )
-    found = simulate_sampled(design, case.reference, kind, drive, (SAMPLES - 0.5) / rate, plant)
+    found = simulate_sampled(design, case.reference, kind, drive, (SAMPLES - 0.5) / rate, plant, form="thesis")
     loop = loop_of(design, plant)
     theta = Factors(0.0) if kind is None else of_block(kind.theta1_tilde)
     theta2 = Factors(0.0) if kind is None else (loop.model * of_block(kind.one_plus)).reduced()

@@ -102,7 +102,7 @@ def audit(design: Design) -> Audit:
 
     same = None
     chosen = design.parameters
-    if isinstance(chosen, ExtendedParameters) and not chosen.inverse_epsilon:
+    if isinstance(chosen, ExtendedParameters) and not chosen.inverse_epsilon and "C0" in design.blocks:
         s = 1j * frequency_grid(shapes, per_decade=20)
         s = s[np.abs(s) > 1e-2 * chosen.a]  # below, both are differences that vanish
         C_s = smith_controller(plant, design.blocks["C0"], s)
@@ -146,7 +146,7 @@ def _require_consistent(design: Design) -> None:
     """Refuse blocks that do not follow from the plant and from each other, (2.6) or (3.29)."""
     plant, blocks = design.loop_plant, design.blocks
     if isinstance(design.parameters, ExtendedParameters):
-        expected, found = stabiliser(plant, blocks["T_so"], design.parameters.inverse_epsilon)[2], blocks["K"]
+        expected, found = stabiliser(plant, blocks["T_so"], design.parameters.inverse_epsilon), blocks["K"]
     else:
         expected, found = plant_numerator(plant) * blocks["Lambda"].inverse(), blocks["G_A"]
     s = geometric_scale(expected) * np.array([0.1, 1.0 + 0.5j, 7.0])

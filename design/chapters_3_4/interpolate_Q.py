@@ -116,18 +116,18 @@ def by_zeros(wanted: Conditions, pairs: Sequence[tuple[float, float]]) -> Stable
     InputError
         There are not as many, or an e or f is not positive, so that Q would be unstable.
     """
-    poles = poles_of(wanted, pairs)
+    poles = poles_of(wanted.omegas, pairs)
     q = np.atleast_1d(np.real(np.poly(poles)))
     s = 1j * np.array(wanted.omegas)
     values = np.polyval(q, s) * np.array(wanted.at_omegas)
     return StableFunction(_through(wanted.omegas, q[-1] * wanted.at_zero, values), poles)
 
 
-def poles_of(wanted: Conditions, pairs: Sequence[tuple[float, float]]) -> tuple[complex, ...]:
-    """The roots of s^2 + e s + f for all pairs, in rad/s; raises InputError as :func:`by_zeros` does."""
-    if len(pairs) != len(wanted.omegas):
+def poles_of(omegas: Sequence[float], pairs: Sequence[tuple[float, float]]) -> tuple[complex, ...]:
+    """The roots of s^2 + e s + f, in rad/s, a pair for each sinusoid; raises InputError as :func:`by_zeros` does."""
+    if len(pairs) != len(omegas):
         raise InputError(
-            f"the reference has {len(wanted.omegas)} frequencies above 0 and there are {len(pairs)} pairs e, f; "
+            f"the reference has {len(omegas)} frequencies above 0 and there are {len(pairs)} pairs e, f; "
             "expected a pair for each"
         )
     for e, f in pairs:

@@ -8,47 +8,95 @@ from dataclasses import dataclass
 import numpy as np
 
 from design.blocks.block import Block, bound_block, fastest_root, plant_block
-from design.blocks.frequency_peak import CERTIFIED, block_norm, peak, searched_norm
-from design.chapters_3_4.interpolate_Q import Conditions
-from design.chapters_3_4.smith_predictor import FreePart, rolled_off, stabiliser
+from design.blocks.frequency_peak import CERTIFIED, block_norm, frequency_grid, peak
+from design.blocks.inner_outer import inner_outer
+from design.chapters_3_4.tracking import RolledOff, TrackingConditions, outer_part
 from design.stability.margins import tracking_floor
+from identification.base.arrays import Real
 from identification.base.errors import InputError
 from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
 
-MOST_POLES = 3  # of the roll-off, beyond what the plant's own excess of poles takes
-PER_DECADE = 10
+MOST_POLES = 3  # of the roll-off, beyond the least order
+PER_DECADE = 10  # rates that are tried
+COARSE = 12  # frequencies a decade that exclude a rate at once
+STEPS = 8  # of 0.1 % each, by which a rate is lowered whose level cannot be proved
 
 
 @dataclass(frozen=True)
 class Redesign:
-    """The free part with a roll-off.
+    """A T_so with a roll-off.
 
     Parameters
     ----------
-    free
-        Q, C_0 and T_so.
+    T_so
+        With ``order`` poles at -rate beside those that were given.
     rate, order
-        T_so has ``order`` additional poles at -rate (rad/s); with none the design meets the level as it is.
+        In rad/s, and how many.
     peak
-        ||W_a C S||_inf.
+        ||W_a C S||_inf, proved as :func:`design.blocks.frequency_peak.block_norm` says.
     sensitivity
-        ||S||_inf = ||1 - T_so exp(-T_d s)||_inf, by search on a refined grid.
+        ||S||_inf = ||1 - T_so T_si||_inf, by search on a refined grid.
     """
 
-    free: FreePart
+    T_so: Block
     rate: float
     order: int
     peak: float
     sensitivity: float
 
 
-def robust_free_part(
+class Loop:
+    """|W_a C S| and |S| of a plant with T_so of given poles and any roll-off, C S = T_so/P_o being exact.
+
+    Parameters
+    ----------
+    plant, bound
+        P with its dead time, and W_a.
+    wanted, poles
+        As for :func:`design.chapters_3_4.tracking.outer_part`.
+    """
+
+    def __init__(
+        self, plant: PlantModel, bound: AdditiveBound, wanted: TrackingConditions, poles: Sequence[complex]
+    ) -> None:
+        self.wanted, self.poles = wanted, tuple(poles)
+        self.T_si, P_o = inner_outer(plant)
+        self.per_T_so = bound_block(bound) * P_o.inverse()
+        self.family = RolledOff(wanted, poles)
+        self.roots = (*poles, *self.per_T_so.zeros, *self.per_T_so.poles, *(1j * omega for omega in wanted.omegas))
+
+    def robustness(self, omega: Real, rate: Real, order: int) -> Real:
+        """|W_a C S| at frequencies (n,) in rad/s for rates (m,) in rad/s, shape (m, n)."""
+        return np.asarray(np.abs(self.per_T_so(1j * omega) * self.family.T_so(omega, rate, order)))
+
+    def sensitivity(self, omega: Real, rate: Real, order: int) -> Real:
+        """|S| likewise."""
+        return np.asarray(np.abs(1 - self.T_si(1j * omega) * self.family.T_so(omega, rate, order)))
+
+    def peak(self, of: Callable[[Real, Real, int], Real], rate: float, order: int) -> float:
+        """The largest value found of one of the two."""
+        roots = (*self.roots, *(complex(-rate),) * bool(order))
+        return peak(lambda omega: of(omega, np.array([rate]), order)[0], roots)[0]
+
+
+def least_order(plant: PlantModel) -> int:
+    """How many poles of the roll-off the controller cannot do without.
+
+    K = T_so/P_o is proper where T_so has as many poles more than zeros as P, and the realisation of C without hidden
+    modes is proper where it has as many as P has poles in Re s >= 0; one comes from the conditions.
+    """
+    return max(plant.relative_degree, max(plant.integrators, 0) + len(plant.unstable_poles), 1) - 1
+
+
+def robust_outer_part(
     plant: PlantModel,
     bound: AdditiveBound,
-    wanted: Conditions,
-    pairs: Sequence[tuple[float, float]],
+    wanted: TrackingConditions,
+    a: float,
+    poles: Sequence[complex],
     level: float,
+    order: int | None = None,
 ) -> Redesign:
     """The latest roll-off found of T_so with ||W_a C S|| <= level: the loop around every plant within W_a is stable.
 
@@ -56,10 +104,14 @@ def robust_free_part(
     ----------
     plant, bound
         P with its dead time, and W_a.
-    wanted, pairs
-        As for :func:`design.chapters_3_4.smith_predictor.rolled_off`.
+    wanted, poles
+        As for :func:`design.chapters_3_4.tracking.outer_part`; the roll-off's poles come in addition.
+    a
+        How fast the loop is to be, rad/s: rates from a hundredth of it, or of the slowest sinusoid, are tried.
     level
         Between 0 and 1.
+    order
+        Of the roll-off; every one from the least to MOST_POLES more unless given.
 
     Raises
     ------
@@ -68,7 +120,7 @@ def robust_free_part(
 
     Notes
     -----
-    With the model as the plant C S = K = s T_so/(K R_0) exactly. Tracking asks for T(j omega) = 1 at the reference's
+    With the model as the plant C S = K = T_so/P_o exactly. Tracking asks for T(j omega) = 1 at the reference's
     frequencies, where therefore |W_a C S| = |W_a/P| for every controller: where that exceeds 1 no controller is
     robust. Elsewhere T_so may be as small as we like, since values on the axis can be interpolated by functions that
     are small away from them. The roll-off is one family of such functions: for each number of poles the first of a
@@ -76,58 +128,80 @@ def robust_free_part(
     ||W_a C S|| is at most the level is proved for what is returned, by :func:`design.blocks.frequency_peak.block_norm`;
     that no later roll-off meets it is not.
     """
-    if not 0 < level < 1:
-        raise InputError(f"the level of |W_a C S| is {level:g}; expected between 0 and 1")
-    floor = tracking_floor(plant, bound, (0.0, *wanted.omegas))
-    if floor >= level:
-        raise InputError(
-            f"|W_a/P| is {floor:.4g} at a frequency of the reference, and so is |W_a C S| for every controller that "
-            f"follows it; expected less than the level {level:g}"
-        )
-    excess = plant_block(plant).relative_degree - 1
-    W_a = bound_block(bound)
-
-    def attempt(rate: float, order: int) -> Redesign:
-        free = rolled_off(wanted, pairs, rate, order)
-        product = W_a * stabiliser(plant, free.T_so)[2]
-        robustness, _ = searched_norm(product)
-        T = Block(free.T_so.gain, free.T_so.zeros, free.T_so.poles, wanted.delay_s)
-        sensitivity, _ = peak(lambda omega: np.abs(1 - T(1j * omega)), T.zeros + T.poles)
-        return Redesign(free, rate, order, robustness, sensitivity)
-
+    floor = require_possible(plant, bound, wanted, level)
+    loop = Loop(plant, bound, wanted, poles)
+    limit, least = level * (1 - CERTIFIED), least_order(plant)
+    orders = range(least, least + MOST_POLES + 1) if order is None else (order,)
+    coarse = frequency_grid(loop.roots, COARSE)
     met: list[Redesign] = []
     best = np.inf
-    fast, slow = _ends(plant, bound, wanted)
+    fast = 10 * max(fastest_root(plant_block(plant), bound_block(bound)), a)
+    slow = min(a, *wanted.omegas) / 100
     rates = np.geomspace(fast, slow, int(PER_DECADE * np.log10(fast / slow)) + 2)
-    for order in range(excess, excess + MOST_POLES + 1):
-        above = None
-        for rate in rates if order else rates[:1]:
-            found = attempt(float(rate), order)
-            best = min(best, found.peak)
-            if found.peak <= level * (1 - CERTIFIED):
-                latest = found if above is None else _latest(attempt, found, above, level * (1 - CERTIFIED))
-                proved, _ = block_norm(W_a * stabiliser(plant, latest.free.T_so)[2])
-                if proved <= level * (1 - CERTIFIED):
-                    met.append(latest)
+    for order in orders:
+        tried = rates if order else rates[:1]
+        seen = loop.robustness(coarse, tried, order).max(axis=1)
+        best = min(best, float(seen.min()))
+        for k in np.flatnonzero(seen <= limit):
+            if loop.peak(loop.robustness, float(tried[k]), order) <= limit:
+                rate = _latest(loop, float(tried[k]), float(tried[k - 1]), order, limit) if k else float(tried[k])
+                met += _proved(plant, bound, loop, rate, order, limit)
                 break
-            above = found
     if met:
         return min(met, key=lambda redesign: redesign.sensitivity)
     raise InputError(
-        f"no roll-off tried, of up to {excess + MOST_POLES} poles, brings ||W_a C S|| below {best:.4g}, the level "
+        f"no roll-off tried, of up to {orders[-1]} poles, brings ||W_a C S|| below {best:.4g}, the level "
         f"is {level:g}; expected a slower a, e and f (no controller gets below {floor:.4g})"
     )
 
 
-def _ends(plant: PlantModel, bound: AdditiveBound, wanted: Conditions) -> tuple[float, float]:
-    """A decade above the fastest root of plant and W_a, and a hundredth of the slowest of what T_so already has."""
-    fastest = fastest_root(plant_block(plant), bound_block(bound))
-    return 10 * max(fastest, wanted.a), min((wanted.a, *wanted.omegas)) / 100
+def require_possible(plant: PlantModel, bound: AdditiveBound, wanted: TrackingConditions, level: float) -> float:
+    """The least ||W_a C S|| of any controller that tracks; raises InputError where the level is not above it."""
+    if not 0 < level < 1:
+        raise InputError(f"the level of |W_a C S| is {level:g}; expected between 0 and 1")
+    at = (*((0.0,) if wanted.at_zero else ()), *wanted.omegas)
+    values = [tracking_floor(plant, bound, [omega]) for omega in at]
+    floor = max(values)
+    if floor >= level:
+        beyond = at[int(np.argmax(values))]
+        accepted = "a level above that, or " if floor < 1 else ""
+        raise InputError(
+            f"|W_a/P| is {floor:.4g} at {beyond:.6g} rad/s, and so is |W_a C S| for every controller that follows a "
+            f"reference there; expected less than the level {level:g}: {accepted}{_known(plant, bound, level)}"
+        )
+    return floor
 
 
-def _latest(attempt: Callable[[float, int], Redesign], low: Redesign, high: Redesign, level: float) -> Redesign:
-    """Bisection between a rate that meets the level and a greater one that does not, to 1e-3."""
-    while high.rate > low.rate * 1.001:
-        middle = attempt(float(np.sqrt(low.rate * high.rate)), low.order)
-        low, high = (middle, high) if middle.peak <= level else (low, middle)
+def _known(plant: PlantModel, bound: AdditiveBound, level: float) -> str:
+    """Where |W_a/P| is below a level, in words: the widest interval in octaves."""
+    share = bound_block(bound) * plant_block(plant).without_delay().inverse()
+    omega = frequency_grid(share.zeros + share.poles)
+    below = np.concatenate([[False], np.abs(share(1j * omega)) < level, [False]])
+    starts, ends = np.flatnonzero(np.diff(below.astype(int)) == 1), np.flatnonzero(np.diff(below.astype(int)) == -1) - 1
+    if not len(starts):
+        return f"a better known plant (|W_a/P| is below {level:g} nowhere)"
+    widest = int(np.argmax(omega[ends] / omega[starts]))
+    low, high = omega[starts[widest]], omega[ends[widest]]
+    return f"a frequency at which the model is better known, such as {low:.4g} to {high:.4g} rad/s"
+
+
+def _proved(
+    plant: PlantModel, bound: AdditiveBound, loop: Loop, rate: float, order: int, limit: float
+) -> list[Redesign]:
+    """The design with this rate, or one lower by up to STEPS thousandths, whose level is proved; else none."""
+    inverse = inner_outer(plant)[1].inverse()
+    for _ in range(STEPS):
+        T_so = outer_part(loop.wanted, (*loop.poles, *(complex(-rate),) * order))
+        norm, _ = block_norm(bound_block(bound) * (T_so * inverse))
+        if norm <= limit:
+            return [Redesign(T_so, rate, order, norm, loop.peak(loop.sensitivity, rate, order))]
+        rate *= 1 - 1e-3
+    return []
+
+
+def _latest(loop: Loop, low: float, high: float, order: int, limit: float) -> float:
+    """Bisection between a rate that meets the limit and a greater one that does not, to 1e-3."""
+    while high > low * 1.001:
+        middle = float(np.sqrt(low * high))
+        low, high = (middle, high) if loop.peak(loop.robustness, middle, order) <= limit else (low, middle)
     return low

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from design.blocks.block import (
-    Block,
-    from_polynomial,
-    plant_denominator,
-    plant_numerator,
-    polynomial,
-    require_thesis_class,
-)
-from design.chapters_3_4.interpolate_Q import Conditions, StableFunction, poles_of, polynomial_through
+from design.blocks.block import Block, from_polynomial, polynomial
+from design.blocks.inner_outer import inner_outer
+from design.chapters_3_4.interpolate_Q import StableFunction
 from identification.base.arrays import Complex
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
@@ -57,83 +50,71 @@ def free_part(Q: StableFunction, a: float) -> FreePart:
     return FreePart(Q.block(), numerator * denominator.inverse(), numerator * poles.inverse())
 
 
-def rolled_off(wanted: Conditions, pairs: Sequence[tuple[float, float]], rate: float, order: int) -> FreePart:
-    """The design by the zeros of Q with a T_so that rolls off beyond a rate: more poles, the same conditions.
-
-        T_so = n(s)/((s + a)^2 q(s) (1 + s/rate)^order),   n of degree 2 k + 1 for k frequencies.
+def free_part_of(T_so: Block, a: float) -> FreePart:
+    """Q and C_0 of a T_so that meets the conditions (4.4) of a plant with one integrator, Thesis Eq. (3.9) and (4.2).
 
     Parameters
     ----------
-    wanted
-        What Q must be, and a.
-    pairs
-        e and f of the factors of q, as in :func:`design.chapters_3_4.interpolate_Q.by_zeros`.
-    rate
-        In rad/s, positive.
-    order
-        Number of additional poles; 0 is the design of the thesis.
-
-    Raises
-    ------
-    InputError
-        A number is out of its range.
+    T_so
+        With T_so(0) = 1, two poles at -a among others, and T_so(j omega) = exp(j omega T_d) at the reference.
+    a
+        In rad/s.
 
     Notes
     -----
-    The thesis's T_so has one pole more than zeros, so that K = s T_so/(K R_0) does not roll off at all. (4.4) says
-    T_so(0) = 1, T_so'(0) = T_d and T_so(j omega) = exp(j omega T_d): 2 k + 2 real conditions, as many as n has
-    coefficients, whatever the denominator. Q = ((s + a)^2 T_so - a (s + a))/s is then stable, so that this is
-    within Theorem 2.1.1.
+    Q = ((s + a)^2 T_so - a (s + a))/s is stable, so that every such T_so is within Theorem 2.1.1.
     """
-    if not (np.isfinite(rate) and rate > 0):
-        raise InputError(f"the roll-off begins at {rate:g} rad/s; expected a positive number")
-    a, delay_s, s = wanted.a, wanted.delay_s, 1j * np.array(wanted.omegas)
-    poles = Block(rate**-order, (*poles_of(wanted, pairs), *(complex(-rate),) * order))
-    q = polynomial(poles)
-    D = np.polymul([1.0, 2 * a, a**2], q)
-    values = np.polyval(D, s) * np.exp(s * delay_s)
-    points = np.append(0.0, -np.square(wanted.omegas))
-    even = polynomial_through(points, np.append(D[-1], values.real))
-    odd = polynomial_through(points, np.append(D[-2] + delay_s * D[-1], values.imag / np.array(wanted.omegas)))
-    n = np.zeros(2 * len(points))
-    n[0::2], n[1::2] = odd, even
+    poles = list(T_so.poles)
+    for _ in range(2):
+        poles.remove(complex(-a))
+    q = polynomial(Block(1.0, tuple(poles)))
+    n, D = polynomial(Block(T_so.gain, T_so.zeros)), np.polymul([1.0, 2 * a, a**2], q)
     # both vanish at s = 0 by the first condition
     over_s = np.asarray(np.polysub(D, n))[:-1]
     Q_numerator = np.asarray(np.polysub(n, a * np.polymul([1.0, a], q)))[:-1]
-    numerator = from_polynomial(n)
     return FreePart(
-        Q=from_polynomial(Q_numerator) * poles.inverse(),
-        C_0=numerator * from_polynomial(over_s).inverse(),
-        T_so=numerator * Block(1.0, (), (complex(-a), complex(-a))) * poles.inverse(),
+        Q=from_polynomial(Q_numerator) * Block(1.0, (), tuple(poles)),
+        C_0=Block(T_so.gain, T_so.zeros) * from_polynomial(over_s).inverse(),
+        T_so=T_so,
     )
 
 
-def stabiliser(plant: PlantModel, T_so: Block, inverse_epsilon: float = 0.0) -> tuple[Block, Block, Block]:
-    """K_0 = C_0/(1 + C_0/s) = s T_so, K_1 = 1/(K R_0) and K = K_0 K_1, Thesis Eq. (3.26)-(3.29).
+def stabiliser(plant: PlantModel, T_so: Block, inverse_epsilon: float = 0.0) -> Block:
+    """K = T_so/P_o, Thesis Eq. (3.29) with K_0 = s T_so and K_1 = 1/(K R_0) for one integrator.
 
     Parameters
     ----------
     plant
-        One integrator; beside it as many zeros as poles, or fewer where T_so or ``inverse_epsilon`` rolls off.
+        P, of which P_o is the outer factor, see :func:`design.blocks.inner_outer.inner_outer`.
     T_so
-        See :class:`FreePart`.
+        Stable.
     inverse_epsilon
         epsilon of R_eps^-1 = R_0^-1/(1 + epsilon s)^2 in seconds, Thesis Eq. (3.2); 0 is the exact inverse.
 
     Raises
     ------
     InputError
-        epsilon is negative, the plant is not of the class, or K comes out improper.
+        epsilon is negative, or K comes out improper.
     """
-    if not (np.isfinite(inverse_epsilon) and inverse_epsilon >= 0):
-        raise InputError(f"epsilon of the approximate inverse is {inverse_epsilon:g} s; expected 0 or more")
-    lag = (complex(-1 / inverse_epsilon),) * 2 if inverse_epsilon else ()
-    require_thesis_class(plant, T_so.relative_degree - 1 + len(lag))
-    s = Block(1.0, (0j,))
-    K_0 = s * T_so
-    inverse = plant_denominator(plant) * s.inverse() * plant_numerator(plant).inverse()
-    K_1 = inverse * Block(float(np.prod(np.abs(lag))), (), lag)
-    return K_0, K_1, K_0 * K_1
+    K = T_so * inner_outer(plant)[1].inverse() * _lag(inverse_epsilon)
+    if K.relative_degree < 0:
+        raise InputError(
+            f"the plant has {plant.relative_degree} poles more than zeros and T_so {T_so.relative_degree}, so that the "
+            f"controller is improper; expected {-K.relative_degree} poles more of T_so (a roll-off, by a robust level)"
+        )
+    return K
+
+
+def thesis_factors(plant: PlantModel, T_so: Block, inverse_epsilon: float = 0.0) -> tuple[Block, Block]:
+    """K_0 = C_0/(1 + C_0/s) = s T_so and K_1 = 1/(K R_0) of a plant with one integrator, Thesis Eq. (3.26)-(3.28)."""
+    over_s = Block(1.0, (), (0j,))
+    return T_so * over_s.inverse(), inner_outer(plant)[1].inverse() * over_s * _lag(inverse_epsilon)
+
+
+def _lag(epsilon: float) -> Block:
+    if not (np.isfinite(epsilon) and epsilon >= 0):
+        raise InputError(f"epsilon of the approximate inverse is {epsilon:g} s; expected 0 or more")
+    return Block(1 / epsilon**2, (), (complex(-1 / epsilon),) * 2) if epsilon else Block(1.0)
 
 
 def smith_controller(plant: PlantModel, C_0: Block, s: ArrayLike) -> Complex:

@@ -154,40 +154,37 @@ def _given_out(actuator: Actuator, control: float) -> float:
 
 
 @njit(nogil=True)
-def _late(whole: int, now: float, before: float, p: Array, k: int) -> float:
-    """What a dead time gives of p at sample k, see :class:`experiments.drive.difference_equations.SampledBlock`."""
-    value = 0.0
-    if k >= whole:
-        value = now * p[k - whole]
-    if k > whole:
-        value += before * p[k - whole - 1]
+def _late(block: SampledBlock, output: int, p: Array, k: int) -> float:
+    """What the memory of an output gives of p at sample k."""
+    value, last = 0.0, k - block.first[output]
+    for j in range(min(block.length[output], last + 1)):
+        value += block.taps[output, j] * p[last - j]
     return value
 
 
 @njit(nogil=True)
 def run(
-    forward: SampledBlock, feedback: SampledBlock, theta: SampledBlock, plant: Series, actuator: Actuator, T: float,
-    r: Array, watch: Array,
+    forward: SampledBlock, feedback: SampledBlock, theta: SampledBlock, around: float, resolution: float,
+    plant: Series, actuator: Actuator, T: float, r: Array, watch: Array,
 ) -> tuple[Array, Array, Array, Array, int]:  # fmt: skip
     """y, u, commands, the actuator's place as each command is issued (s,), and how many samples were reached.
 
-    ``forward`` maps e to v, ``feedback`` v to what is fed back to it, and ``theta`` u_tilde to what u gives up and to
-    y_d; ``feedback`` and y_d have one dead time, the model's. ``watch`` is that of
+    ``forward`` maps e to v, ``feedback`` v to what is fed back to it, the sum of its outputs, and ``theta`` u_tilde to
+    what u gives up and to y_d; ``around`` is what ``feedback`` takes of v at once; v is a whole
+    multiple of a ``resolution`` that is not 0. ``watch`` is that of
     :func:`experiments.engine.watched.watched`: the samples reached, and whether to stop there.
     """
     # out of the tuples, into which a look costs as much as an addition
     A_K, b_K, c_K, d_K = forward.A, forward.b, forward.C[0], forward.d[0]
-    A_T, b_T, c_T, d_T = feedback.A, feedback.b, feedback.C[0], feedback.d[0]
+    A_T, b_T, C_T, d_T = feedback.A, feedback.b, feedback.C, feedback.d
     A_w, b_w, C_w, d_w = theta.A, theta.b, theta.C, theta.d
     b, c, late, read, early = plant.b, plant.c, plant.late, plant.read, plant.early
     s = len(r)
     y, u, command, start = np.zeros(s), np.zeros(s), np.zeros(s), np.zeros(s)
-    p_T, p_w = np.zeros(s), np.zeros(s)  # T_so v and theta2 u_tilde before their dead time
+    p_T, p_w = np.zeros((len(d_T), s)), np.zeros(s)  # of feedback, and theta2 u_tilde, before their memories
     x, x_K, x_T, x_w = np.zeros(len(b)), np.zeros(len(b_K)), np.zeros(len(b_T)), np.zeros(len(b_w))
     term, following = np.empty(len(b)), np.empty(max(len(b), len(b_K), len(b_T), len(b_w)))
-    whole, now, before = feedback.whole[0], feedback.now[0], feedback.before[0]
-    at_once = now if whole == 0 else 0.0
-    around, direct = at_once * d_T, at_once * d_w[1]
+    direct = theta.taps[1, 0] * d_w[1] if theta.first[1] == 0 else 0.0
     through = d_K * direct / (1 - around)  # u_tilde -> y_d -> v
     low, high, slew = actuator.low, actuator.high, actuator.slew
     limit = max(abs(low) if np.isfinite(low) else 0.0, abs(high) if np.isfinite(high) else 0.0)
@@ -203,15 +200,22 @@ def run(
         watch[REACHED] = k
         if watch[STOP] != 0.0:
             return y, u, command, start, k
-        p_T[k], p_w[k] = _dot(c_T, x_T), _row(C_w, 1, x_w)
-        e = r[k] - y[k] - _late(whole, now, before, p_w, k)
-        v = (_dot(c_K, x_K) + d_K * e + _late(whole, now, before, p_T, k)) / (1 - around)
+        p_w[k] = _row(C_w, 1, x_w)
+        e = r[k] - y[k] - _late(theta, 1, p_w, k)
+        v = _dot(c_K, x_K) + d_K * e
+        for o in range(len(d_T)):
+            p_T[o, k] = _row(C_T, o, x_T)
+            v += _late(feedback, o, p_T[o], k)
+        v /= 1 - around
+        if resolution > 0:
+            v = resolution * np.floor(v / resolution)
         u_0 = v - _row(C_w, 0, x_w)
         u_tilde = (u_0 - min(max(u_0, low), high)) / (1 + d_w[0] + through)
         v -= through * u_tilde
         e -= direct * u_tilde
         u[k] = u_0 - (d_w[0] + through) * u_tilde
-        p_T[k] += d_T * v
+        for o in range(len(d_T)):
+            p_T[o, k] += d_T[o] * v
         p_w[k] += d_w[1] * u_tilde
         command[k], start[k] = _given_out(actuator, u[k]), place
 

@@ -11,9 +11,10 @@ import numpy as np
 from design.anti_windup.compensator import AntiWindup
 from design.blocks.block import Block, plant_block
 from design.blocks.state_space import block_diagonal, realize
+from design.chapters_3_4.realisation import realised
 from design.design_file import Asked, Design
 from experiments.drive.compiled_steps import Actuator, Series, run
-from experiments.drive.difference_equations import METHODS, SampledBlock, sample_block, split
+from experiments.drive.difference_equations import METHODS, SampledBlock, sample_block, sample_memory, split
 from experiments.engine.simulate import MOST_STEPS, DivergenceError, limit_pair
 from experiments.engine.watched import Tick, watched
 from experiments.runs.disturbances import UNDISTURBED, Disturbances, Signal
@@ -21,6 +22,8 @@ from experiments.runs.references import Reference, SampledReference
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
+FORMS = ("coprime", "thesis")
+"""How the controller is realised."""
 MOST_LEVELS = 2.0**53  # which are still whole numbers
 SPARE = 1e-12  # relative: the quotient of two decimals may come out a rounding below a whole number
 
@@ -44,6 +47,9 @@ class Drive:
         The most that the actuator's output changes in a second; inf is no limit.
     input_delay_s
         From the sampling instant to the actuator's answer: computation and transport.
+    resolution
+        Of the computer's own numbers, in the actuator's unit: v is cut down to a multiple of it, as a shift of a
+        fixed-point number does; 0 is none.
     """
 
     rate_hz: float
@@ -52,6 +58,7 @@ class Drive:
     quantum: float = 0.0
     slew: float = math.inf
     input_delay_s: float = 0.0
+    resolution: float = 0.0
 
     def __post_init__(self) -> None:
         low, high = limit_pair(self.limits)
@@ -66,6 +73,8 @@ class Drive:
             raise InputError(f"the slew is {self.slew:g} a second; expected a positive number, inf for no limit")
         if not 0 <= self.input_delay_s < math.inf:
             raise InputError(f"the input delay is {self.input_delay_s:g} s; expected a number that is not negative")
+        if not 0 <= self.resolution < math.inf:
+            raise InputError(f"the resolution is {self.resolution:g}; expected 0 or a positive number")
         largest = max((abs(end) for end in self.limits if math.isfinite(end)), default=0.0)
         if self.quantum > 0 and largest / self.quantum > MOST_LEVELS:
             raise InputError(f"the quantum is {self.quantum:g}; expected 0, or no less than the limits over 2^53")
@@ -129,6 +138,7 @@ def simulate_sampled(
     until_s: float,
     plant: PlantModel | None = None,
     tick: Tick | None = None,
+    form: str = FORMS[0],
     disturbances: Disturbances = UNDISTURBED,
 ) -> SampledRun:
     """Run a design from rest with its controller on a computer.
@@ -143,6 +153,9 @@ def simulate_sampled(
         Length of the run in seconds, one sample at least.
     tick
         Called some times a second with the number of samples done since the last call.
+    form
+        ``coprime``, the realisation without hidden modes of :mod:`design.chapters_3_4.realisation`, or ``thesis``, K
+        and T_so as drawn in Fig. 2.6.
     disturbances
         At the plant's input, between the actuator and the plant's dead time, at its output, and noise, all of
         continuous time; the computer's samples hold what the last two are at the sampling instants.
@@ -174,11 +187,14 @@ def simulate_sampled(
             f"the run lasts {until_s:g} s; expected a finite time of one sample, {1 / drive.rate_hz:g} s, at least"
         )
     series = _series(design.loop_plant if plant is None else plant, drive, until_s, disturbances.input)
-    controller = _controller(design, design.chosen(anti_windup), drive)
+    controller = _controller(design, design.chosen(anti_windup), drive, form)
     time_s = instants(drive.rate_hz, until_s)
     r, output, noise = reference(time_s), disturbances.output, disturbances.noise
     y, u, command, start, reached = watched(
-        partial(run, *controller, series, drive.actuator, 1 / drive.rate_hz, r - disturbances.seen(time_s)), tick
+        partial(
+            run, *controller, drive.resolution, series, drive.actuator, 1 / drive.rate_hz, r - disturbances.seen(time_s)
+        ),
+        tick,
     )
     if reached < len(r):
         raise DivergenceError(float(time_s[reached]))
@@ -216,25 +232,30 @@ def _series(plant: PlantModel, drive: Drive, until_s: float, disturbance: Signal
 
 
 def _controller(
-    design: Design, anti_windup: AntiWindup | None, drive: Drive
-) -> tuple[SampledBlock, SampledBlock, SampledBlock]:
-    """K/(1 + F) or K; T_so behind the model's dead time; theta1~, and theta2 behind that dead time."""
+    design: Design, anti_windup: AntiWindup | None, drive: Drive, form: str
+) -> tuple[SampledBlock, SampledBlock, SampledBlock, float]:
+    """What makes v of e, and of v; theta1~, and theta2 behind its dead time; what v takes of itself at once."""
+    if form not in FORMS:
+        raise InputError(f"the form is '{form}'; expected {' or '.join(FORMS)}")
     delay_s, T = design.loop_plant.delay_s, 1 / drive.rate_hz
     first, second = design.controller_parts()
     compensator = (Block(0.0), Block(0.0))
     if anti_windup is not None:
         compensator = (anti_windup.theta1_tilde, anti_windup.theta2(design.loop_plant))
+    if form == "thesis":
+        feedback = sample_block(realize(second), [delay_s], T, drive.method)
+    else:
+        factors = realised(design)
+        first, feedback = factors.forward, sample_memory(factors, T, drive.method)
     forward = sample_block(realize(first), [0.0], T, drive.method)
-    feedback = sample_block(realize(second), [delay_s], T, drive.method)
     theta = sample_block(realize(*compensator), [0.0, delay_s], T, drive.method)
-    around = feedback.now[0] * feedback.d[0] if feedback.whole[0] == 0 else 0.0
-    later = theta.now[1] * theta.d[1] if theta.whole[1] == 0 else 0.0
-    if not (around < 1 and 1 + theta.d[0] + forward.d[0] * later / (1 - around) > 0):
+    around = float(feedback.at_once.sum())
+    if not (around < 1 and 1 + theta.d[0] + forward.d[0] * theta.at_once[1] / (1 - around) > 0):
         raise InputError(
             f"at {drive.rate_hz:g} Hz Tustin's rule leaves the controller an algebraic loop without one solution; "
             "expected a higher rate, or the method exact"
         )
-    return forward, feedback, theta
+    return forward, feedback, theta, around
 
 
 def _actuator(drive: Drive, command: np.ndarray, start: np.ndarray) -> np.ndarray:

@@ -193,6 +193,11 @@ class FitRecord:
         """Whether the sign of any test's phase was reversed."""
         return any(test.conjugated for test in self.tests)
 
+    @property
+    def band(self) -> tuple[float, float]:
+        """The lowest and the highest line of all tests, in rad/s."""
+        return min(test.band[0] for test in self.tests), max(test.band[1] for test in self.tests)
+
     def to_dict(self, plant: PlantModel) -> dict[str, Any]:
         """The ``fit`` object of the model.json of a plant."""
         return {

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from identification.base.arrays import Complex
 from identification.base.errors import InputError, shown
-from identification.model.modes import Mode, factors_of, quotient, require_finite, require_left, roots_of
+from identification.model.modes import Mode, factors_of, quotient, require_finite, roots_of
 from identification.model.parameter import Parameter
 from identification.model.python_control import from_control, lowest, to_control
 
@@ -35,13 +35,13 @@ class PlantModel:
     gain
         K in output units per input unit and second^integrators, not zero; its sign is the plant's.
     zero_modes, pole_modes
-        Anti-resonances, of negative damping for zeros in the right half plane, and resonances.
+        Anti-resonances and resonances; negative damping puts a pair of roots in the right half plane.
     delay_s
         The dead time h = T_d in seconds, not negative. Evaluated exactly, never as a rational function.
     integrators
         -2 to 2; a negative number counts zeros at s = 0, as a measured velocity or acceleration has.
     real_zeros, real_poles
-        Rates a in rad/s of factors 1 + s/a: positive, or negative for a zero in the right half plane.
+        Rates a in rad/s of factors 1 + s/a: positive, or negative for a root in the right half plane.
 
     Raises
     ------
@@ -67,11 +67,11 @@ class PlantModel:
             raise InputError(f"delay_s is {self.delay_s:g}; expected zero or a positive number of seconds")
         if isinstance(self.integrators, bool) or self.integrators not in INTEGRATORS:
             raise InputError(f"integrators is {shown(self.integrators)}; expected an integer from -2 to 2")
-        require_left(real_poles=self.real_poles, pole_modes=self.pole_modes)
-        for rate in self.real_zeros:
-            require_finite(**{"a number of real_zeros": rate})
-            if rate == 0:
-                raise InputError("a number of real_zeros is 0; expected any other number (integrators counts s = 0)")
+        for name in ("real_zeros", "real_poles"):
+            for rate in getattr(self, name):
+                require_finite(**{f"a number of {name}": rate})
+                if rate == 0:
+                    raise InputError(f"a number of {name} is 0; expected any other number (integrators counts s = 0)")
         if self.relative_degree < 0:
             zeros = 2 * len(self.zero_modes) + len(self.real_zeros)
             poles = zeros + self.relative_degree
@@ -105,6 +105,12 @@ class PlantModel:
         """The zeros in the right half plane, rad/s."""
         zeros = roots_of(self.zero_modes, self.real_zeros)
         return tuple(zero for zero in zeros if zero.real > 0)
+
+    @property
+    def unstable_poles(self) -> tuple[complex, ...]:
+        """The poles in the open right half plane, rad/s; those at s = 0 are ``integrators``."""
+        poles = roots_of(self.pole_modes, self.real_poles)
+        return tuple(pole for pole in poles if pole.real > 0)
 
     def without_delay(self) -> PlantModel:
         """The delay-free factor G(s) of chapter 2."""

@@ -23,6 +23,7 @@ from design.chapters_3_4.smith_predictor import (
     free_part,
     smith_controller,
     stabiliser,
+    thesis_factors,
 )
 from design.design_file import Design
 from design.hinf.closed_loop_norm import closed_loop_poles
@@ -171,7 +172,7 @@ def test_2_2_lambda_takes_the_poles_off_the_reference(seed: int) -> None:
     R = np.array([z.row @ np.linalg.solve(at * np.eye(len(z.start)) - z.matrix, z.start) for at in s])
     # the Laplace transform of 50 sin(omega t + phase)
     np.testing.assert_allclose(R, 50 * (s * np.sin(phase) + omega * np.cos(phase)) / (s**2 + omega**2), rtol=1e-9)
-    Lambda = reference_polynomial(omega, 1e-4)
+    Lambda = reference_polynomial([omega], 1e-4)
     np.testing.assert_allclose(Lambda(s), (s**2 + 1e-4) * (s**2 + omega**2), rtol=1e-12)
     R_0_of_s = Lambda(s) * R
     cubic = np.linalg.solve(np.vander(s[:4], 4), R_0_of_s[:4])
@@ -187,7 +188,7 @@ def test_2_3_the_plant_is_B_over_A_and_so_is_F_1(seed: int) -> None:
     assert not B.poles + A.poles  # polynomials
     np.testing.assert_allclose(plant_block(plant)(s), plant.gain / s * R_0(plant, s), rtol=1e-10)
     np.testing.assert_allclose(B(s) / A(s), plant.gain / s * R_0(plant, s), rtol=1e-10)
-    np.testing.assert_allclose(internal_model(plant, 1.5, 1e-4).F1(s), B(s) / A(s), rtol=1e-10)
+    np.testing.assert_allclose(internal_model(plant, [1.5], 1e-4).F1(s), B(s) / A(s), rtol=1e-10)
 
 
 def test_lemma_1_the_error_of_the_linear_loop_dies_out(delay_free_design: Design) -> None:
@@ -196,7 +197,7 @@ def test_lemma_1_the_error_of_the_linear_loop_dies_out(delay_free_design: Design
     plant = delay_free_design.plant.without_delay()
     s = points(np.random.default_rng(0))
     A, B, Lambda = plant_denominator(plant), plant_numerator(plant), blocks["Lambda"]
-    units = internal_model(plant, omega, delay_free_design.parameters.epsilon)
+    units = internal_model(plant, [omega], delay_free_design.parameters.epsilon)
     one_plus_F = 1 + units.F1(s) * units.F2(s)
     loop = design_loop(delay_free_design, sinusoid(50.0, omega, 0.7, 0.0), None)
     found = [signals(loop, complex(at), free=True) for at in s]
@@ -213,7 +214,7 @@ def test_lemma_1_the_error_of_the_linear_loop_dies_out(delay_free_design: Design
 def test_2_4_to_2_6_the_internal_model(seed: int) -> None:
     random = np.random.default_rng(seed)
     plant, omega = random_plant(random).without_delay(), float(random.uniform(0.5, 5))
-    units, s = internal_model(plant, omega, 1e-4), points(random)
+    units, s = internal_model(plant, [omega], 1e-4), points(random)
     A, B = plant_denominator(plant)(s), plant_numerator(plant)(s)
     Lambda = (s**2 + 1e-4) * (s**2 + omega**2)
     np.testing.assert_allclose(1 + units.F1(s) * units.F2(s), Lambda / A, rtol=1e-6)  # (2.4)
@@ -227,7 +228,7 @@ def test_remark_1_the_weights_hold_the_reference_and_the_uncertainty(delay_free_
     design = delay_free_design
     assert design.hinf is not None
     W_1, W_2, rate = design.hinf.W1, design.hinf.W2, design.hinf.decay_rate
-    Lambda = reference_polynomial(*design.reference_omegas, design.parameters.epsilon)
+    Lambda = reference_polynomial(design.reference_omegas, design.parameters.epsilon)
     np.testing.assert_allclose(W_1.poles, np.array(Lambda.zeros) - 2 * rate, rtol=1e-12)
     s = 1j * np.geomspace(0.1, 1e3, 300)
     G = design.plant.without_delay()
@@ -479,7 +480,7 @@ def test_3_2_the_smith_predictor_based_controller(smith: Smith) -> None:
     exact = 1 / (plant.gain * R_0(plant, s)) * inner
     np.testing.assert_allclose(smith_controller(plant, smith.free.C_0, s), exact, rtol=1e-7)
     # with the approximate inverse, in the form that is realised: K/(1 - T_so exp(-T_d s))
-    K = stabiliser(plant, smith.free.T_so, inverse_epsilon=1e-3)[2]
+    K = stabiliser(plant, smith.free.T_so, inverse_epsilon=1e-3)
     approximate = 1 / (plant.gain * R_0(plant, s) * (1 + 1e-3 * s) ** 2) * inner
     np.testing.assert_allclose(anti_windup_controller(plant, K, smith.free.T_so, s), approximate, rtol=1e-6)
 
@@ -499,7 +500,7 @@ def test_3_3_3_4_and_4_3_the_free_part_at_the_reference(smith: Smith) -> None:
 def test_3_5_the_characteristic_equation_is_1_plus_C_0_over_s(smith: Smith) -> None:
     """Times the denominator of C_0/s it is the characteristic function of the loop, whose dead time is gone."""
     plant, free, s = smith.plant, smith.free, smith.s
-    loop = DelayLoop(plant_block(plant), stabiliser(plant, free.T_so)[2], free.T_so, plant.delay_s)
+    loop = DelayLoop(plant_block(plant), stabiliser(plant, free.T_so), free.T_so, plant.delay_s)
     exact = evaluate(loop.characteristic, s)[0]
     denominator = s * np.prod([s - pole for pole in free.C_0.poles], axis=0)
     visible = np.prod([s - root for root in loop.denominator.zeros], axis=0)
@@ -569,7 +570,7 @@ def test_3_11_the_plant_with_its_dead_time_as_a_block(seed: int) -> None:
 
 
 def extended_loop(smith: Smith) -> tuple[DelayLoop, Block]:
-    K = stabiliser(smith.plant, smith.free.T_so)[2]
+    K = stabiliser(smith.plant, smith.free.T_so)
     return DelayLoop(plant_block(smith.plant), K, smith.free.T_so, smith.plant.delay_s), K
 
 
@@ -694,7 +695,7 @@ def test_3_23_F_2_is_minus_C_s_S_s(designs: list[Design]) -> None:
 @each
 def test_3_24_and_3_31_the_new_controller(smith: Smith) -> None:
     """With T_so written out by C_0; and it is the Smith predictor's, since K is (3.29)."""
-    K, s = stabiliser(smith.plant, smith.free.T_so)[2], smith.s
+    K, s = stabiliser(smith.plant, smith.free.T_so), smith.s
     C_0 = smith.free.C_0(s)
     T_so = (C_0 / s) / (1 + C_0 / s)
     C_aw = anti_windup_controller(smith.plant, K, smith.free.T_so, s)
@@ -721,7 +722,8 @@ def test_3_25_the_sensitivity(smith: Smith) -> None:
 
 @each
 def test_3_26_to_3_29_the_stabiliser(smith: Smith) -> None:
-    K_0, K_1, K = (block(smith.s) for block in stabiliser(smith.plant, smith.free.T_so))
+    blocks = (*thesis_factors(smith.plant, smith.free.T_so), stabiliser(smith.plant, smith.free.T_so))
+    K_0, K_1, K = (block(smith.s) for block in blocks)
     C_0 = smith.free.C_0(smith.s)
     np.testing.assert_allclose(K, K_0 * K_1, rtol=1e-9)  # (3.26)
     np.testing.assert_allclose(K_1, 1 / (smith.plant.gain * R_0(smith.plant, smith.s)), rtol=1e-9)
@@ -733,7 +735,7 @@ def test_3_26_to_3_29_the_stabiliser(smith: Smith) -> None:
 def test_3_27_as_corrected(smith: Smith) -> None:
     """1 + P C_aw = (1 - T_so e + K_0 e/s)/(1 - T_so e), for any K_0; the print is 1 - T_so e/(1 + K_0 e/s)."""
     s, late, T_so = smith.s, smith.late, smith.free.T_so(smith.s)
-    _, K_1, K = stabiliser(smith.plant, smith.free.T_so)
+    K_1, K = thesis_factors(smith.plant, smith.free.T_so)[1], stabiliser(smith.plant, smith.free.T_so)
     for K_0 in (Block(1.0, (0j,)) * smith.free.T_so, Block(2.0, (-9 + 0j,), (-3 + 0j,))):
         loop = DelayLoop(plant_block(smith.plant), K_0 * K_1, smith.free.T_so, smith.plant.delay_s)
         function = evaluate(loop.characteristic, s)[0] / loop.denominator(s) / (1 - T_so * late)

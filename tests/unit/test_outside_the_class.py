@@ -10,7 +10,6 @@ import pytest
 from design.auditing.audit_design import audit, covered_delay
 from design.blocks.block import Block, plant_block
 from design.chapters_3_4.design_extended import design_extended
-from design.chapters_3_4.smith_predictor import stabiliser
 from design.design_file import Design
 from design.stability.characteristic_roots import roots_right_of
 from design.stability.delay_loop import DelayLoop
@@ -18,7 +17,6 @@ from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import simulate
 from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
-from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 
 
@@ -108,11 +106,3 @@ def test_the_approximate_inverse_is_stable_for_small_epsilon_only(implied: Ident
     assert not isinstance(audit(stable).margins, str)
     unstable = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=1.0)
     assert "right half plane" in str(audit(unstable).margins)
-
-
-def test_a_plant_with_two_integrators_is_refused_with_the_reason(implied: IdentifiedModel) -> None:
-    plant = PlantModel(1.0, (Mode(50.0, 0.1),), (Mode(80.0, 0.1),), 0.01, integrators=2)
-    with pytest.raises(ValueError, match=r"has 2 integrators; the design expects exactly one.*\(3\.2\) and \(3\.16\)"):
-        design_extended(dataclasses.replace(implied, plant=plant), [1.5], 4.0, [(2.0, 1.0)])
-    with pytest.raises(ValueError, match="has 2 integrators"):
-        stabiliser(plant, Block(1.0, (), (-1 + 0j, -1 + 0j)))

@@ -62,7 +62,9 @@ def test_integrator_with_a_dead_time_under_a_held_input(extended_design: Design,
     """y(t_k) = y(t_{k-1}) + g (the two commands that reach the plant, each for its share of the sample)."""
     g, gain, T = 2.5, 0.7, 0.1
     design = proportional(extended_design, gain, PlantModel(g, (), (), delay_s))
-    run = simulate_sampled(design, Reference((0.0,), (0.0,), (0.0,), 3.0), None, Drive(1 / T, method, (-1.5, 2.0)), 4.0)
+    run = simulate_sampled(
+        design, Reference((0.0,), (0.0,), (0.0,), 3.0), None, Drive(1 / T, method, (-1.5, 2.0)), 4.0, form="thesis"
+    )
     late = math.floor(delay_s / T + 1e-9)
     share = delay_s / T - late
     y, m = np.zeros(41), np.zeros(41)
@@ -80,7 +82,9 @@ def test_a_slewing_actuator_in_closed_form(extended_design: Design) -> None:
     g, slew, limit, T, late = 2.0, 3.0, 5.0, 0.13, 0.37
     design = proportional(extended_design, 1.0, PlantModel(g, (), (), 0.21))
     reference = Reference((0.0,), (0.0,), (0.0,), 1e6)
-    run = simulate_sampled(design, reference, None, Drive(1 / T, "exact", (-limit, limit), 0.0, slew, late), 6.0)
+    run = simulate_sampled(
+        design, reference, None, Drive(1 / T, "exact", (-limit, limit), 0.0, slew, late), 6.0, form="thesis"
+    )
 
     def since(delay_s: float) -> np.ndarray:
         return np.clip(run.time_s - delay_s, 0, None)
@@ -94,7 +98,9 @@ def test_a_slewing_actuator_in_closed_form(extended_design: Design) -> None:
 
 def test_levels_are_the_nearest_ones_within_the_limits(extended_design: Design) -> None:
     design = proportional(extended_design, 1.0, PlantModel(1.0, (), (), 0.05))
-    run = simulate_sampled(design, sinusoid(20.0, 3.0, 0.4, 0.0), None, Drive(40.0, "exact", (-13.0, 7.0), 2.0), 9.0)
+    run = simulate_sampled(
+        design, sinusoid(20.0, 3.0, 0.4, 0.0), None, Drive(40.0, "exact", (-13.0, 7.0), 2.0), 9.0, form="thesis"
+    )
     assert set(np.unique(run.saturated_control)) <= set(np.arange(-12.0, 7.0, 2.0))
     assert {-12.0, 6.0} <= set(run.saturated_control)  # and not -14 or 8
     inside = (run.control > -12) & (run.control < 6)
@@ -129,7 +135,12 @@ def test_the_linear_steady_state_is_the_frequency_response(extended_design: Desi
     loop *= pulse_response(dataclasses.replace(plant, delay_s=plant.delay_s + late), 1 / rate, [omega])[0]
     S = inner / (inner + loop)
     run = simulate_sampled(
-        extended_design, sinusoid(3.0, omega, 0.3, 0.0), None, Drive(rate, method, FREE, input_delay_s=late), 30.0
+        extended_design,
+        sinusoid(3.0, omega, 0.3, 0.0),
+        None,
+        Drive(rate, method, FREE, input_delay_s=late),
+        30.0,
+        form="thesis",
     )
     steady = np.imag(3.0 * S * np.exp(1j * (omega * run.time_s + 0.3)))
     last = run.time_s > 26
@@ -231,7 +242,7 @@ def test_the_run_solves_the_loops_equations(
     T = OTHER.delay_s / samples
     kind = compensator(other_design, name)
     drive = Drive(1 / T, method, (-limit, limit - 0.25), 0.0625, 30.0, 0.3 * T)
-    run = simulate_sampled(other_design, REFERENCE, kind, drive, 60 * T, TRUE)
+    run = simulate_sampled(other_design, REFERENCE, kind, drive, 60 * T, TRUE, form="thesis")
     actuator, output = driven(run, drive, TRUE)
     np.testing.assert_allclose(run.saturated_control, actuator, rtol=0, atol=1e-9)
     np.testing.assert_allclose(run.output, output, rtol=0, atol=1e-8 * np.abs(output).max())

@@ -29,12 +29,8 @@ def run(block: SampledBlock, given: np.ndarray) -> np.ndarray:
     for k, i in enumerate(given):
         p[k] = block.C @ x + block.d * i
         x = block.A @ x + block.b * i
-        for m, whole in enumerate(block.whole):
-            w[k, m] = sum(
-                weight[m] * p[k - late, m]
-                for weight, late in ((block.now, whole), (block.before, whole + 1))
-                if k >= late
-            )
+        for m, first in enumerate(block.first):
+            w[k, m] = sum(block.taps[m, j] * p[k - first - j, m] for j in range(block.length[m]) if k >= first + j)
     return w
 
 

@@ -51,7 +51,7 @@ def test_the_table_over_time_is_the_runs(design: Design, tables: dict[str, pd.Da
         drive = Drive(
             rate, "tustin", (-LIMIT, LIMIT), facts["quantum"], 2 * LIMIT / facts["full_range_s"], input_delay_s=1 / rate
         )
-        run = simulate_sampled(design, reference, kind, drive, table["time_s"].iloc[-1])
+        run = simulate_sampled(design, reference, kind, drive, table["time_s"].iloc[-1], form="thesis")
         at = np.round(table["time_s"] * rate).astype(int)
         np.testing.assert_allclose(table[f"error_{name}_drive"], run.error[at], rtol=0, atol=1e-9)
         row = summary[(summary["run"] == name) & (summary["method"] == "tustin") & (summary["rate_hz"] == rate)]
@@ -78,7 +78,7 @@ def test_a_run_that_diverges_has_empty_cells(
     assert set(zip(gone["run"], gone["method"], strict=True)) == {("thesis", "exact")}
     assert gone["settling_s"].isna().all()
 
-    def diverging(*_arguments: object) -> None:
+    def diverging(*_arguments: object, **_options: object) -> None:
         raise DivergenceError(1.0)
 
     monkeypatch.setattr(sampled_rates, "simulate_sampled", diverging)

@@ -110,7 +110,7 @@ def _run(
 ) -> SampledRun | None:
     """A run, or None if it diverges."""
     try:
-        return simulate_sampled(design, reference, kind, drive, horizon)
+        return simulate_sampled(design, reference, kind, drive, horizon, form="thesis")
     except DivergenceError:
         return None
 

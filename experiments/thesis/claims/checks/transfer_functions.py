@@ -10,7 +10,14 @@ from design.anti_windup.compensator import second_order
 from design.blocks.block import Block, plant_block
 from design.chapter_2.internal_model import InternalModel, internal_model
 from design.chapters_3_4.interpolate_Q import by_zeros, conditions
-from design.chapters_3_4.smith_predictor import FreePart, anti_windup_controller, augmented_plant, free_part, stabiliser
+from design.chapters_3_4.smith_predictor import (
+    FreePart,
+    anti_windup_controller,
+    augmented_plant,
+    free_part,
+    stabiliser,
+    thesis_factors,
+)
 from experiments.thesis.claims.inputs import Inputs, plant_of
 from identification.model.plant import PlantModel
 from identification.model.plant_json import bound_from_dict
@@ -95,13 +102,13 @@ def F(inputs: Inputs) -> dict[str, float]:
 def K0(inputs: Inputs) -> dict[str, float]:
     """K_0 of section 4.2, Thesis Eq. (3.28)."""
     plant = plant_of(inputs)
-    return coefficients("K0", stabiliser(plant, _free_part(plant).T_so)[0])
+    return coefficients("K0", thesis_factors(plant, _free_part(plant).T_so)[0])
 
 
 def K1(inputs: Inputs) -> dict[str, float]:
     """K_1 = 1/(K R_0) of section 4.2, Thesis Eq. (3.29)."""
     plant = plant_of(inputs)
-    return coefficients("K1", stabiliser(plant, _free_part(plant).T_so)[1])
+    return coefficients("K1", thesis_factors(plant, _free_part(plant).T_so)[1])
 
 
 def G_A_extended(inputs: Inputs) -> dict[str, float]:
@@ -128,7 +135,7 @@ def C_aw(inputs: Inputs) -> dict[str, float]:
     """
     plant = plant_of(inputs)
     T_so = _free_part(plant).T_so
-    K = stabiliser(plant, T_so)[2]
+    K = stabiliser(plant, T_so)
     block = _over_one_plus_F(K, T_so, plant.delay_s)
     exact = complex(anti_windup_controller(plant, K, T_so, LOW))
     form = complex(_without_fast_pair(block)(LOW))
@@ -142,7 +149,7 @@ def _anti_windup() -> tuple[float, float, float]:
 
 def _internal_model(inputs: Inputs) -> InternalModel:
     chosen = printed_numbers()["delay_free"]
-    return internal_model(plant_of(inputs), 2 * np.pi / chosen["reference"]["period_s"], chosen["epsilon"])
+    return internal_model(plant_of(inputs), [2 * np.pi / chosen["reference"]["period_s"]], chosen["epsilon"])
 
 
 def _free_part(plant: PlantModel) -> FreePart:
