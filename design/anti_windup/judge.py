@@ -263,7 +263,7 @@ def compensators(
         except NoCompensatorError:
             if not weaker:
                 raise
-            said = f"{said}; no theta1~ of the class has {condition}"
+            said = f"{said}; no theta1~ of the class was found that meets {condition}"
             condition = weaker.pop(0)
     M = found.anti_windup.one_plus
     k, proof = (condition.k, None) if isinstance(condition, Sector) else (None, certificate(M))
