@@ -233,9 +233,11 @@ def harmonic(plant: PlantModel, reference: Reference) -> Reference:
 def finite_limits(plant: PlantModel, limits: float | Sequence[float]) -> tuple[float, float]:
     """The lower and the upper limit; refuses what :func:`periodic_limit` does."""
     low, high = limit_pair(limits)
-    said = f"{high:g}" if np.size(limits) == 1 else f"{low:g} {high:g}"
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise InputError(f"the limit is {said}; expected a positive finite number, or a lower and a higher one")
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise InputError(f"the saturation limits are {low:g} and {high:g}; expected finite ones")
     if plant.integrators > 0 and not low < 0 < high:
-        raise InputError(f"the limit is {said}, so that a plant with an integrator drifts; expected limits around 0")
+        raise InputError(
+            f"the saturation limits are {low:g} and {high:g}, between which a plant with an integrator drifts; "
+            "expected 0 between them"
+        )
     return low, high
