@@ -70,7 +70,7 @@ def limits(design: Path, limits: tuple[float, ...], output: Path, **reference: A
 
     from design.design_file import read_design
     from experiments.asked_reference import sinusoids
-    from experiments.physical_limits.least_peak_error import limits_tables
+    from experiments.physical_limits.limits_tables import limits_tables
 
     content = read_design(design)
     with tqdm(desc="limits", unit="", disable=None, leave=False) as bar:

@@ -80,6 +80,7 @@ def simulate_command(
     from experiments.runs.disturbances import UNDISTURBED
     from experiments.runs.guarantee import guarantee
     from experiments.runs.metrics import last_saturation
+    from experiments.runs.region import require_within_region
     from experiments.runs.sector_promise import judge_run
 
     limits = asked_limits(limit)
@@ -103,6 +104,7 @@ def simulate_command(
     asked = reference_of(content, **reference)
     disturbances = disturbances_of(until, input_disturbance, output_disturbance, noise, seed)
     true = None if plant is None else asked_model(plant).plant
+    require_within_region(true or content.loop_plant, asked, limits)
     loop = design_loop(content, asked, kind, true, disturbances)
     with tqdm(total=until, desc="simulate", bar_format=SHARE, disable=None, leave=False) as bar:
         run = simulate(loop, limits, time_s, bar.update, rate_limit)
@@ -145,6 +147,18 @@ def simulate_command(
 @click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels; 0, no levels, by default.")
 @click.option("--slew", type=float, default=math.inf, help="Most change of the actuator in a second; inf by default.")
 @click.option("--input-delay", type=float, default=0.0, help="From sample to actuator in seconds; 0 by default.")
+@click.option(
+    "--form",
+    default="coprime",
+    show_default=True,
+    help="How the controller is realised: coprime, without hidden modes, or thesis, as drawn in Fig. 2.6.",
+)
+@click.option(
+    "--resolution",
+    type=float,
+    default=0.0,
+    help="Of the computer's own numbers, in the actuator's unit; 0, as fine as doubles, by default.",
+)
 def sampled_command(
     design: Path,
     limit: tuple[float, ...],
@@ -155,6 +169,8 @@ def sampled_command(
     quantum: float,
     slew: float,
     input_delay: float,
+    form: str,
+    resolution: float,
     plant: str | None,
     input_disturbance: Sequence[tuple[float, ...]],
     output_disturbance: Sequence[tuple[float, ...]],
@@ -177,9 +193,10 @@ def sampled_command(
     from experiments.drive.sampled_loop import Drive, simulate_sampled
     from experiments.runs.disturbances import UNDISTURBED
     from experiments.runs.guarantee import guarantee
+    from experiments.runs.region import require_within_region
     from experiments.runs.sector_promise import steady_control, verdict
 
-    drive = Drive(rate, method, asked_limits(limit), quantum, slew, input_delay)
+    drive = Drive(rate, method, asked_limits(limit), quantum, slew, input_delay, resolution)
     _require_few_rows(until * rate)
     inputs = _inputs(design, plant, reference["reference"])
     require_writable(output, inputs=inputs)
@@ -188,8 +205,9 @@ def sampled_command(
     asked = reference_of(content, **reference)
     disturbances = disturbances_of(until, input_disturbance, output_disturbance, noise, seed)
     true = None if plant is None else asked_model(plant).plant
+    require_within_region(true or content.loop_plant, asked, drive.limits)
     with tqdm(total=until * rate, desc="sampled", bar_format=SHARE, disable=None, leave=False) as bar:
-        run = simulate_sampled(content, asked, kind, drive, until, true, bar.update, disturbances=disturbances)
+        run = simulate_sampled(content, asked, kind, drive, until, true, bar.update, disturbances, form)
     low, high = drive.limits
     beyond = run.time_s[(run.control < low) | (run.control > high)]
     last = f", the last at {beyond[-1]:.6g} s" if len(beyond) else ""

@@ -138,8 +138,8 @@ def simulate_sampled(
     until_s: float,
     plant: PlantModel | None = None,
     tick: Tick | None = None,
-    form: str = FORMS[0],
     disturbances: Disturbances = UNDISTURBED,
+    form: str = FORMS[0],
 ) -> SampledRun:
     """Run a design from rest with its controller on a computer.
 
@@ -153,12 +153,12 @@ def simulate_sampled(
         Length of the run in seconds, one sample at least.
     tick
         Called some times a second with the number of samples done since the last call.
-    form
-        ``coprime``, the realisation without hidden modes of :mod:`design.chapters_3_4.realisation`, or ``thesis``, K
-        and T_so as drawn in Fig. 2.6.
     disturbances
         At the plant's input, between the actuator and the plant's dead time, at its output, and noise, all of
         continuous time; the computer's samples hold what the last two are at the sampling instants.
+    form
+        ``coprime``, the realisation without hidden modes of :mod:`design.chapters_3_4.realisation`, or ``thesis``, K
+        and T_so as drawn in Fig. 2.6.
 
     Raises
     ------
@@ -190,11 +190,9 @@ def simulate_sampled(
     controller = _controller(design, design.chosen(anti_windup), drive, form)
     time_s = instants(drive.rate_hz, until_s)
     r, output, noise = reference(time_s), disturbances.output, disturbances.noise
+    seen = r - disturbances.seen(time_s)
     y, u, command, start, reached = watched(
-        partial(
-            run, *controller, drive.resolution, series, drive.actuator, 1 / drive.rate_hz, r - disturbances.seen(time_s)
-        ),
-        tick,
+        partial(run, *controller, drive.resolution, series, drive.actuator, 1 / drive.rate_hz, seen), tick
     )
     if reached < len(r):
         raise DivergenceError(float(time_s[reached]))
