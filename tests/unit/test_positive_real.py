@@ -115,7 +115,23 @@ def test_the_least_f_is_that_of_a_convex_program(implied: IdentifiedModel, robus
     assert found.f <= 1.01 * program.value
 
 
-@pytest.mark.parametrize("M", [WASHOUT, LAG, NOTCH, Block(1.0)], ids=["washout", "lag", "notch", "one"])
+def test_what_falls_below_zero_between_two_frequencies_is_solved_more_tightly() -> None:
+    modes = (Mode(1.22, 0.00131), Mode(112.0, 0.0525), Mode(266.0, 0.425))
+    bound = AdditiveBound(0.00381, (), modes, (74.8, 9430.0, 633.0, 1.7, 4350.0, 293.0), (30900.0, 88400.0))
+    found = corrected((), bound, 5.0, PositiveReal(), 246.0, False)
+    assert found.f_lower <= found.f <= 1.001 * found.f_lower  # 1.0097 without
+
+
+SLOW_AND_FAST = Block(
+    1.0,
+    (0j, -0.64167 + 42.122j, -0.64167 - 42.122j, -219.91 + 0j, -1155.8 + 0j),
+    (-0.15790 + 0j, *(complex(-104.72),) * 4),
+)
+
+
+@pytest.mark.parametrize(
+    "M", [WASHOUT, LAG, NOTCH, SLOW_AND_FAST, Block(1.0)], ids=["washout", "lag", "notch", "slow and fast", "one"]
+)
 def test_the_certificate_dissipates(M: Block) -> None:
     """2 x'P (A x + b u~) <= 2 u~ (C x + u~) for any x and u~, and C, A, b are M's."""
     storage = proved_storage(M, certificate(M))
