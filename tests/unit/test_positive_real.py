@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from design.__main__ import main
 from design.anti_windup.chosen_guarantee import chosen_guarantee, why_not_global
 from design.anti_windup.compensator import from_one_plus
 from design.anti_windup.condition import PositiveReal, Robustness, Sector, is_positive_real
@@ -234,6 +236,20 @@ def test_which_plants_have_a_global_guarantee() -> None:
             chosen_guarantee((0j,), asked, sector, None)
     with pytest.raises(InputError, match="the guarantee is 'global', but no guarantee for every control exists"):
         chosen_guarantee((0j, 0j), "global", None, None)
+
+
+def test_the_command_takes_a_guarantee(tmp_path: Path) -> None:
+    output = tmp_path / "design.json"
+    options = ["extended", "implied", "--reference-omega", "1.5", "--a", "4", "--e", "2", "--f", "1"]
+    options += ["--output", str(output), "--guarantee"]
+    refused = CliRunner().invoke(main, [*options, "robust"])
+    assert refused.exit_code == 2
+    assert "|W_a C S| reaches 8.84 at 175 rad/s; a robust guarantee expects less than 1/2" in refused.output
+    assert not output.exists()
+    result = CliRunner().invoke(main, [*options, "robust", "--robust-level", "0.3"])
+    assert result.exit_code == 0, result.output
+    assert "guarantee of the corrected one: robust, for every plant within W_a the windup ends" in result.output
+    assert read_design(output).corrected.guarantee == "robust"
 
 
 def test_a_plant_without_integrator_keeps_the_smaller_f() -> None:
