@@ -143,7 +143,7 @@ def _options(
     loop = Loop(plant, bound, wanted, fixed_poles(wanted, a, pairs_of(a, wanted.omegas)))
     omega = frequency_grid(loop.roots, COARSE)[::THIN]
     fastest = fastest_root(plant_block(plant), bound_block(bound))
-    ends = 10 * max(fastest, a), min(a, *wanted.omegas) / 10
+    ends = 10 * max(fastest, a), min((a, *wanted.omegas)) / 10
     rates = np.geomspace(*ends, int(RATES * np.log10(ends[0] / ends[1])) + 2)
     least, found = least_order(plant), []
     for order in range(least, least + MOST_POLES + 1):

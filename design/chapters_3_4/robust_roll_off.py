@@ -136,7 +136,7 @@ def robust_outer_part(
     met: list[Redesign] = []
     best = np.inf
     fast = 10 * max(fastest_root(plant_block(plant), bound_block(bound)), a)
-    slow = min(a, *wanted.omegas) / 100
+    slow = min((a, *wanted.omegas)) / 100
     rates = np.geomspace(fast, slow, int(PER_DECADE * np.log10(fast / slow)) + 2)
     for order in orders:
         tried = rates if order else rates[:1]
