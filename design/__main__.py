@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from design.choices import METHODS, ROBUST_LEVEL, SECTOR
+from design.choices import GUARANTEES, METHODS, ROBUST_LEVEL, SECTOR
 from identification.base.command_line import CommandGroup, together
 from identification.base.digits import lower_end, upper_end
 from identification.base.errors import InputError
@@ -37,12 +37,16 @@ corrected_options = together(
         help="Corrected anti-windup: most time in s for y_d to fall to 1 %; that of the loop itself unless given.",
     ),
     click.option(
+        "--guarantee",
+        type=click.Choice(GUARANTEES),
+        help="Corrected anti-windup: global, whatever the control; robust, so for every plant within W_a; sector, up "
+        "to a control. Global unless given, or sector where the plant allows no other.",
+    ),
+    click.option(
         "--sector",
         type=float,
-        default=SECTOR,
-        show_default=True,
-        help="Corrected anti-windup: sector of the circle criterion, below 1; |u| may reach "
-        "(limit - sector V)/(1 - sector), V the control that the reference takes.",
+        help="Of --guarantee sector: k of the circle criterion, below 1; |u| may reach (limit - k V)/(1 - k), V the "
+        f"control that the reference takes; {SECTOR:g} unless given.",
     ),
     click.option(
         "--bandwidth",
@@ -74,7 +78,8 @@ def delay_free(
     period: float,
     epsilon: float,
     recovery: float | None,
-    sector: float,
+    guarantee: str | None,
+    sector: float | None,
     bandwidth: float | None,
     output: Path,
 ) -> None:
@@ -84,7 +89,7 @@ def delay_free(
 
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
-    design = design_delay_free(given, period, epsilon, recovery, sector, bandwidth)
+    design = design_delay_free(given, period, epsilon, recovery, sector, bandwidth, guarantee)
     hinf = design.hinf
     assert hinf is not None
     unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
@@ -135,7 +140,8 @@ def extended(
     inverse_epsilon: float,
     robust_level: float | None,
     recovery: float | None,
-    sector: float,
+    guarantee: str | None,
+    sector: float | None,
     bandwidth: float | None,
     output: Path,
 ) -> None:
@@ -167,6 +173,7 @@ def extended(
         recovery,
         sector,
         bandwidth,
+        guarantee,
     )
     poles = ", ".join(f"{pole:.4g}" for pole in design.blocks["T_so"].poles)
     _finish(design, model, output, "\n  ".join((*design.free.reasons, f"T_so has the poles {poles}")))

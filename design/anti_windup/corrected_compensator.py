@@ -1,4 +1,4 @@
-"""The corrected theta1~: 1 + theta1~ is zero at every plant pole that is not stable, and f is least for a sector."""
+"""The corrected theta1~: 1 + theta1~ is zero at every plant pole that is not stable, and f is least."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from design.anti_windup.compensator import AntiWindup, from_one_plus, uncertainty_cost
+from design.anti_windup.condition import Condition
 from design.anti_windup.corrected_program import CorrectedProgram, Vertex
-from design.anti_windup.popov import meets_circle_criterion
 from design.blocks.block import Block, bound_block
 from design.blocks.frequency_peak import searched_norm
 from identification.base.arrays import Real, Whole
@@ -51,11 +51,11 @@ def corrected(
     unstable: tuple[complex, ...],
     bound: AdditiveBound,
     recovery_s: float,
-    sector: float,
+    condition: Condition,
     bandwidth: float,
     faster: bool = True,
 ) -> Corrected:
-    """The theta1~ of least f found in a class whose theta2 is stable, for a stated sector, recovery time and bandwidth.
+    """The theta1~ of least f found in a class whose theta2 is stable, for a condition, a recovery time and a bandwidth.
 
         1 + theta1~ = prod(s - p_i)/(s + rate)^q n(s)/(s + b)^N,  ln(100)/recovery_s <= rate <= b <= bandwidth,
 
@@ -71,8 +71,8 @@ def corrected(
         W_a.
     recovery_s
         Time in seconds in which the slowest mode of theta1~, exp(-rate t), falls to 1 % at most; positive.
-    sector
-        k of Theorem 2.3.1, between 0 and 1: with limits +-L the dead zone lies in it as long as |u| <= L/(1 - k).
+    condition
+        A sector of Theorem 2.3.1, or that 1 + theta1~ is positive real, for the model or for every plant within W_a.
     bandwidth
         In rad/s, no less than ln(100)/recovery_s; no pole of theta1~ is faster.
     faster
@@ -81,7 +81,7 @@ def corrected(
     Raises
     ------
     InputError
-        A number is out of its range, or no such theta1~ meets the sector.
+        A number is out of its range, or no such theta1~ meets the condition.
 
     Notes
     -----
@@ -89,8 +89,7 @@ def corrected(
     if 1 + theta1~ has these zeros. For one integrator and a strictly proper W_a no bandwidth means no optimum:
     s/(s + b) meets every sector below 1, and its f vanishes as b grows.
 
-    For given poles f and Popov's condition are convex in the coefficients of n, and with the multiplier 0 (the
-    circle criterion, which suffices) they are a linear program over half planes, see
+    For given poles f and the condition are convex in the coefficients of n, a linear program over half planes, see
     :class:`design.anti_windup.corrected_program.CorrectedProgram`. The third condition, Re n/d >= 0.1, keeps the zeros
     of n stable, near those of d: the control rings with them as long as the actuator is saturated.
 
@@ -100,13 +99,10 @@ def corrected(
     Every point of a coarse lattice, j a multiple of 16, is solved or excluded by the dual of a program that was solved
     nearby. Between them a point counts if its f is not below 1/OPEN of the lower one of its two coarse neighbours'
     programs; so one whose neighbours are both excluded with that margin cannot win. What is returned is judged again:
-    the sector and f as computed from the roots.
+    the condition and f as computed from the roots.
     """
-    if not (np.isfinite([recovery_s, sector]).all() and recovery_s > 0 and 0 < sector < 1):
-        raise InputError(
-            f"the recovery time is {recovery_s:g} s and the sector {sector:g}; "
-            "expected a positive time and 0 < sector < 1"
-        )
+    if not 0 < recovery_s < np.inf:
+        raise InputError(f"the recovery time is {recovery_s:g} s; expected a positive one")
     slowest = float(np.log(1 / SETTLED)) / recovery_s
     if not slowest * (1 - 1e-9) <= bandwidth < np.inf:
         raise InputError(
@@ -115,7 +111,7 @@ def corrected(
         )
     decades = min(float(np.log10(bandwidth / slowest)) + 1e-9, DECADES)
     slowest = bandwidth / 10**decades
-    search = _Search(unstable, bound, sector, bandwidth, slowest)
+    search = _Search(unstable, bound, condition, bandwidth, slowest)
     i, j = (each.ravel() for each in np.indices((int(RATES * decades) + 1, int(SPREAD / COARSE * decades) + 1)))
     if not faster:
         i, j = i[i == i.max()], j[i == i.max()]
@@ -130,8 +126,8 @@ def corrected(
     search.run(*fine[:, fine[1] >= 0])
     if search.best is None:
         raise InputError(
-            f"no theta1~ of our class with poles from {slowest:g} to {bandwidth:g} rad/s was found that meets the "
-            f"sector {sector:g}; expected a smaller sector or a slower recovery"
+            f"no theta1~ of our class with poles from {slowest:g} to {bandwidth:g} rad/s was found that meets "
+            f"{condition}; expected a weaker guarantee or a slower recovery"
         )
     f, _ = uncertainty_cost(bound, search.best.one_plus)
     return Corrected(search.best, f, max(search.floor, min(f, float(proved.min()), search.best_lower)))
@@ -141,16 +137,21 @@ class _Search:
     """The best theta1~ of the points of a lattice that were tried."""
 
     def __init__(
-        self, unstable: tuple[complex, ...], bound: AdditiveBound, sector: float, bandwidth: float, slowest: float
+        self,
+        unstable: tuple[complex, ...],
+        bound: AdditiveBound,
+        condition: Condition,
+        bandwidth: float,
+        slowest: float,
     ) -> None:
-        self.W_a, self.sector, self.bandwidth = bound_block(bound), sector, bandwidth
-        self.program = CorrectedProgram(unstable, bound, sector, bandwidth, slowest)
+        self.W_a, self.condition, self.bandwidth = bound_block(bound), condition, bandwidth
+        self.program = CorrectedProgram(unstable, bound, condition, bandwidth, slowest)
         self.known: list[tuple[float, float, Vertex]] = []
         self.least: dict[tuple[int, int], float] = {}
         washout = from_one_plus(Block(1.0, unstable, (complex(-bandwidth),) * len(unstable)))
         self.best: AntiWindup | None = None
         self.f = self.best_lower = np.inf
-        if meets_circle_criterion(washout.theta1_tilde, sector):
+        if condition.holds(washout):
             self.best, self.f = washout, searched_norm(self.W_a * washout.one_plus)[0]
         # no f is below |W_a| at infinity, where 1 + theta1~ is 1
         self.floor = 0.0 if self.W_a.relative_degree else self.W_a.gain
@@ -195,11 +196,11 @@ class _Search:
         return np.asarray(self.bandwidth * 10.0 ** (-i / RATES)), np.asarray(self.bandwidth * 10.0 ** (-j / SPREAD))
 
     def _consider(self, i: int, j: int, x: Real, lower: float) -> None:
-        """Keep a compensator that is better than the best so far, meets the sector and counts."""
+        """Keep a compensator that is better than the best so far, meets the condition and counts."""
         rate, b = (float(each) for each in self._poles(i, j))
         kind = self.program.compensator(rate, b, x)
         f, _ = searched_norm(self.W_a * kind.one_plus)
-        if not (f < self.wanted and meets_circle_criterion(kind.theta1_tilde, self.sector)):
+        if not (f < self.wanted and self.condition.holds(kind)):
             return
         below = j - j % COARSE
         beside = [at for at in {below, below + COARSE * (j > below)} if at * RATES <= i * SPREAD]

@@ -8,12 +8,12 @@ from enum import Enum
 import numpy as np
 
 from design.anti_windup.compensator import AntiWindup, from_one_plus
+from design.anti_windup.condition import Condition, PositiveReal
 from design.blocks.block import Block, bound_block, from_polynomial, geometric_scale
 from design.blocks.frequency_peak import frequency_grid
 from identification.base.arrays import Complex, Real
 from identification.model.additive_bound import AdditiveBound
 
-MARGIN = 2e-4  # by which 1/sector is lowered at most, relative: what lies between the frequencies
 PER_DECADE = 200  # frequencies
 REAL_PART = 0.1  # least real part of n over the denominator of W_a on the axis, which keeps the zeros of n stable
 LARGEST = 1e4  # coefficient of n/d - 1, in terms that are 1 at most on the axis
@@ -33,13 +33,13 @@ class Kind(Enum):
     COEFFICIENT = "x_k <= LARGEST"
     FLOOR = "f >= 0"
     MAGNITUDE = "Re weight |E| (1 + psi x) <= f"
-    SECTOR = "Re E (1 + psi x) >= 1 - (1 - margin)/sector"
+    CONDITION = "Re turn E (1 + psi x) weight >= least"
     SHAPE = "Re (1 + psi x) >= REAL_PART"
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the program at one frequency (or, for COEFFICIENT, for one coefficient)."""
+    """A row of the program at one frequency (or, for COEFFICIENT, for one coefficient); ``weight`` is the turn too."""
 
     kind: Kind
     k: int = 0
@@ -71,18 +71,24 @@ class CorrectedProgram:
         The p_i in rad/s, closed under conjugation.
     bound
         W_a, with the monic denominator d of degree N; psi_k = s^k/d, k < N, each scaled to 1 at most on the axis.
-    sector
-        Of the circle criterion, between 0 and 1.
+    condition
+        What 1 + theta1~ has to meet beside f.
     bandwidth, slowest
         In rad/s: no rate or b is above or below.
     """
 
     def __init__(
-        self, unstable: tuple[complex, ...], bound: AdditiveBound, sector: float, bandwidth: float, slowest: float
+        self,
+        unstable: tuple[complex, ...],
+        bound: AdditiveBound,
+        condition: Condition,
+        bandwidth: float,
+        slowest: float,
     ) -> None:
         W_a = bound_block(bound)
+        shaping = condition.robustness.roots if isinstance(condition, PositiveReal) and condition.robustness else ()
         self.unstable, self.poles, self.N = unstable, W_a.poles, len(W_a.poles)
-        grid = frequency_grid((*W_a.zeros, *W_a.poles, *unstable, complex(-bandwidth)), PER_DECADE)
+        grid = frequency_grid((*W_a.zeros, *W_a.poles, *unstable, *shaping, complex(-bandwidth)), PER_DECADE)
         self.below = below = int(np.ceil(max(0.0, PER_DECADE * np.log10(grid[0] / (1e-3 * slowest)))))
         self.omega = np.concatenate([grid[0] * 10.0 ** (-np.arange(below, 0, -1) / PER_DECADE), grid])
         s = 1j * self.omega
@@ -94,7 +100,8 @@ class CorrectedProgram:
         values = W_a(s)
         self.size = float(np.abs(values[below:]).max())
         self.W_a = values / self.size
-        self.least_real = 1 - (1 - min(MARGIN, (1 - sector) / 2)) / sector
+        self.least, self.turns = condition.least, condition.turns(self.omega)
+        self.is_scaled = condition.is_scaled and bool(unstable)
         self.objective = np.append(np.zeros(self.N), 1.0)
 
     def _factor(self, s: Complex, rate: Real | float, b: Real | float) -> Complex:
@@ -106,8 +113,13 @@ class CorrectedProgram:
             value = value * (s - pole) / (s + b)
         return value
 
-    def _row(self, row: Row, E: Complex) -> tuple[Real, Real]:
-        """Left sides, shape (P, N + 1), and limits, (P,), of one row for P values of E at its frequency."""
+    def _weight(self, omega: Real | float, rate: Real | float) -> Real | float:
+        """Of the condition, see :class:`design.anti_windup.condition.PositiveReal`."""
+        return 1 + (rate / omega) ** 2 if self.is_scaled else 1.0
+
+    def _row(self, row: Row, rate: Real, b: Real) -> tuple[Real, Real]:
+        """Left sides, shape (P, N + 1), and limits, (P,), of one row for poles of shape (P,)."""
+        E = self._factor(1j * self.omega[row.k], rate, b)
         left, shape = np.zeros((len(E), self.N + 1)), self.psi[row.k]
         if row.kind is Kind.COEFFICIENT:
             left[:, row.k] = 1.0
@@ -119,9 +131,10 @@ class CorrectedProgram:
             value = row.weight * np.abs(E)
             left[:, :-1], left[:, -1] = (value[:, None] * shape).real, -1.0
             return left, -value.real
-        if row.kind is Kind.SECTOR:
-            left[:, :-1] = -(E[:, None] * shape).real
-            return left, E.real - self.least_real
+        if row.kind is Kind.CONDITION:
+            value = row.weight * E * self._weight(self.omega[row.k], rate)
+            left[:, :-1] = -(value[:, None] * shape).real
+            return left, value.real - self.least
         left[:, :-1] = -shape.real
         return left, np.full(len(E), 1 - REAL_PART)
 
@@ -138,6 +151,7 @@ class CorrectedProgram:
         first = min(self.below, int(np.searchsorted(self.omega, 1e-3 * rate * (1 - 1e-9))))
         psi, E = self.psi[first:], self._factor(1j * self.omega[first:], rate, b)
         weighted = self.W_a[first:] * E
+        turned = self.turns[:, first:] * E * self._weight(self.omega[first:], rate)
         rows = [Row(Kind.COEFFICIENT, k) for k in range(self.N)] + [Row(Kind.FLOOR)]
         left, limits = np.eye(self.N + 1), np.append(np.full(self.N, LARGEST), 0.0)
         left[-1, -1] = -1.0
@@ -154,8 +168,8 @@ class CorrectedProgram:
             excess = np.stack(
                 [
                     (np.abs(value) - f[0]) / max(f[0], 1e-3) * (FEASIBLE / TOLERANCE),
-                    self.least_real - (E * shape).real,
                     REAL_PART - shape.real,
+                    *(self.least - (turned * shape).real),
                 ]
             )
             kind, k = np.unravel_index(np.argmax(excess), excess.shape)
@@ -164,9 +178,13 @@ class CorrectedProgram:
             stalled, reached = (stalled + 1, reached) if f[0] <= reached else (0, f[0])
             if stalled > PATIENCE:
                 kind, k = chance.choice(np.argwhere(excess > FEASIBLE))
-            weight = complex(np.exp(-1j * np.angle(value[k])) * weighted[k] / np.abs(E[k])) if kind == 0 else 0j
-            entering = Row((Kind.MAGNITUDE, Kind.SECTOR, Kind.SHAPE)[kind], first + int(k), weight)
-            new, limit = self._row(entering, E[[k]])
+            entering = Row(Kind.SHAPE, first + int(k))
+            if kind == 0:
+                weight = complex(np.exp(-1j * np.angle(value[k])) * weighted[k] / np.abs(E[k]))
+                entering = Row(Kind.MAGNITUDE, first + int(k), weight)
+            elif kind > 1:
+                entering = Row(Kind.CONDITION, first + int(k), complex(self.turns[kind - 2, first + k]))
+            new, limit = self._row(entering, np.array([rate]), np.array([b]))
             i = self._leaves(left, new[0])
             if i is None:
                 return Vertex((*rows, entering), None)
@@ -209,7 +227,7 @@ class CorrectedProgram:
             ||W_a||, subtracted at its worst. The rows are as computed in double precision. Infinite where they
             contradict each other.
         """
-        pairs = [self._row(row, self._factor(1j * self.omega[row.k], rate, b)) for row in vertex.rows]
+        pairs = [self._row(row, rate, b) for row in vertex.rows]
         left, limits = np.stack([pair[0] for pair in pairs], axis=1), np.stack([pair[1] for pair in pairs], axis=1)
         n = self.N + 1
         sums, worst = np.swapaxes(left[:, :n], 1, 2), np.append(np.full(self.N, LARGEST), 1.0)

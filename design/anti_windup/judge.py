@@ -8,13 +8,17 @@ from typing import Any, Self
 
 import numpy as np
 
+from design.anti_windup.chosen_guarantee import chosen_guarantee
 from design.anti_windup.compensator import AntiWindup, second_order, uncertainty_cost
+from design.anti_windup.condition import Robustness, Sector
 from design.anti_windup.corrected_compensator import SETTLED, corrected
+from design.anti_windup.kyp_certificate import Rows, certificate, proved_storage
 from design.anti_windup.popov import popov_sector, robust_loss, robust_popov_sector
 from design.anti_windup.thesis_compensator import thesis_choice
 from design.blocks.block import Block, bound_block, fastest_root, plant_block
-from design.choices import SECTOR
-from identification.base.json_object import Reader, record
+from design.choices import GUARANTEES
+from identification.base.errors import InputError, shown
+from identification.base.json_object import Reader, numbers, or_none, record
 from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
 
@@ -81,6 +85,7 @@ class Compensator:
         readers: dict[str, Reader] = {
             "AntiWindup": lambda members, _: AntiWindup.from_dict(members),
             "Judgement": lambda members, _: record(Judgement, members),
+            "Rows | None": or_none(_rows),
         }
         return record(cls, content, readers)
 
@@ -106,17 +111,46 @@ class CorrectedCompensator(Compensator):
 
     Parameters
     ----------
+    guarantee, guarantee_said
+        See :func:`design.anti_windup.chosen_guarantee.chosen_guarantee`.
     sector
-        Of the circle criterion, which it was asked to meet.
+        Of the circle criterion, which it was asked to meet; None for another guarantee.
     bandwidth
         In rad/s; no pole of theta1~ lies beyond.
     f_lower
         As of :class:`design.anti_windup.corrected_compensator.Corrected`.
+    certificate
+        P of the storage function of 1 + theta1~, see :mod:`design.anti_windup.kyp_certificate`; None for a sector.
     """
 
-    sector: float
+    guarantee: str
+    guarantee_said: str
+    sector: float | None
     bandwidth: float
     f_lower: float
+    certificate: Rows | None
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """Read what :meth:`to_dict` writes; raises InputError where its certificate proves nothing."""
+        found = super().from_dict(content)
+        if found.guarantee not in GUARANTEES:
+            raise InputError(f"guarantee is {shown(found.guarantee)}; expected one of {', '.join(GUARANTEES)}")
+        if (found.sector is None) != (found.guarantee != "sector") or (found.certificate is None) != (
+            found.guarantee == "sector"
+        ):
+            raise InputError(f"the guarantee '{found.guarantee}' has either a sector or a certificate that is not its")
+        if found.certificate is not None:
+            proved_storage(found.kind.one_plus, found.certificate)
+        return found
+
+
+def _rows(content: Mapping[str, Any], key: str) -> Rows:
+    """A matrix row by row."""
+    rows = content.get(key)
+    if not isinstance(rows, list):
+        raise InputError(f"{shown(key)} is {shown(rows)}; expected a list of rows")
+    return tuple(numbers({key: row}, key) for row in rows)
 
 
 def judge(plant: PlantModel, bound: AdditiveBound, kind: AntiWindup) -> Judgement:
@@ -178,8 +212,11 @@ def compensators(
     bound: AdditiveBound,
     own_s: float,
     recovery_s: float | None = None,
-    sector: float = SECTOR,
+    sector: float | None = None,
     bandwidth: float | None = None,
+    guarantee: str | None = None,
+    robustness: Robustness | None = None,
+    highest_omega: float | None = None,
 ) -> tuple[PrintedCompensator, CorrectedCompensator]:
     """The thesis's and the corrected compensator, each with its judgement.
 
@@ -189,30 +226,40 @@ def compensators(
         P and W_a.
     own_s
         Time in seconds in which the design's own transients fall to 1 %.
-    recovery_s, sector
-        Of the corrected compensator, see :func:`design.anti_windup.corrected_compensator.corrected`. A recovery time
-        that is given is a bound; unless given, the slowest mode takes ``own_s``, to the lattice of the poles: one much
+    recovery_s
+        Of the corrected compensator, see :func:`design.anti_windup.corrected_compensator.corrected`. One that is given
+        is a bound; unless given, the slowest mode takes ``own_s``, to the lattice of the poles: one much
         faster than the loop may have a smaller f, and answers a saturation with a control many times the limits.
     bandwidth
         Of the corrected compensator in rad/s; unless given, that of the fastest root of the plant and of W_a, which is
         as far as they say anything, and at least ten times the rate ln(100)/own_s. It does not depend on
         ``recovery_s``, so that f does not increase with it.
+    guarantee, sector, robustness
+        Of the corrected compensator, see :func:`design.anti_windup.chosen_guarantee.chosen_guarantee`.
+    highest_omega
+        Highest frequency in rad/s at which the plant was measured; None where it is not known. A root of W_a beyond it
+        says nothing of the plant, so that the bandwidth that is not given ends there, or at the loop's own rate
+        ln(100)/own_s where that is faster.
 
     Raises
     ------
     InputError
-        A number is out of its range, or no corrected compensator meets the sector.
+        A number is out of its range, there is no such guarantee, or no corrected compensator meets its condition.
     """
     alpha, beta, gamma = thesis_choice(bound)
+    own_rate = float(np.log(1 / SETTLED)) / own_s
     if bandwidth is None:
-        fastest = fastest_root(plant_block(plant), bound_block(bound))
-        bandwidth = max(fastest, 10 * float(np.log(1 / SETTLED)) / own_s)
+        bandwidth = max(fastest_root(plant_block(plant), bound_block(bound)), 10 * own_rate)
+        if highest_omega is not None:
+            bandwidth = max(min(bandwidth, highest_omega), own_rate)
     unstable, pace = plant_block(plant).unstable_poles, own_s if recovery_s is None else recovery_s
-    found = corrected(unstable, bound, pace, sector, bandwidth, faster=recovery_s is not None)
+    name, condition, said = chosen_guarantee(unstable, guarantee, sector, robustness)
+    found = corrected(unstable, bound, pace, condition, bandwidth, faster=recovery_s is not None)
+    M = found.anti_windup.one_plus
+    k, proof = (condition.k, None) if isinstance(condition, Sector) else (None, certificate(M))
+    own = judge(plant, bound, found.anti_windup)
     printed = second_order(alpha, beta, gamma)
     return (
         PrintedCompensator(printed, judge(plant, bound, printed), alpha, beta, gamma),
-        CorrectedCompensator(
-            found.anti_windup, judge(plant, bound, found.anti_windup), sector, bandwidth, found.f_lower
-        ),
+        CorrectedCompensator(found.anti_windup, own, name, said, k, bandwidth, found.f_lower, proof),
     )

@@ -60,7 +60,11 @@ def not_positive_at(polynomial: Sequence[Fraction]) -> float | None:
 
 def squared_magnitude(roots: Sequence[complex]) -> Polynomial:
     """prod |j omega - root|^2 as a polynomial in x = omega^2; the roots in conjugate pairs, as a block has them."""
-    polynomial = real_polynomial(roots)
+    return squared_on_axis(real_polynomial(roots))
+
+
+def squared_on_axis(polynomial: Sequence[Fraction]) -> Polynomial:
+    """|p(j omega)|^2 as a polynomial in x = omega^2."""
     return _on_axis(multiplied(polynomial, _reflected(polynomial)))
 
 
@@ -83,7 +87,7 @@ def popov_polynomial(block: Block, multiplier: float) -> Polynomial:
     return [gain * value for value in _on_axis(multiplied(product, [Fraction(1), Fraction(multiplier)]))]
 
 
-def _reflected(polynomial: Polynomial) -> Polynomial:
+def _reflected(polynomial: Sequence[Fraction]) -> Polynomial:
     """p(-s)."""
     return [value if k % 2 == 0 else -value for k, value in enumerate(polynomial)]
 

@@ -8,13 +8,21 @@ import numpy as np
 
 from design.anti_windup.corrected_compensator import SETTLED
 from design.anti_windup.judge import compensators
-from design.blocks.block import Block, bound_block, plant_denominator, plant_numerator, require_thesis_class
+from design.blocks.block import (
+    Block,
+    bound_block,
+    plant_block,
+    plant_denominator,
+    plant_numerator,
+    require_thesis_class,
+)
 from design.chapter_2.internal_model import InternalModel, internal_model, reference_polynomial
-from design.choices import SECTOR
 from design.design_file import Design
 from design.hinf.mixed_sensitivity import mixed_sensitivity
 from design.hinf.pick import Problem
 from design.parameters import DelayFreeParameters
+from design.stability.delay_loop import DelayLoop
+from design.stability.margins import robustness_of
 from identification.base.errors import InputError
 from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
@@ -73,8 +81,9 @@ def design_delay_free(
     period_s: float,
     epsilon: float,
     recovery_s: float | None = None,
-    sector: float = SECTOR,
+    sector: float | None = None,
     bandwidth: float | None = None,
+    guarantee: str | None = None,
 ) -> Design:
     """Chapter 2: Lambda, F1, F2, G_A, the stabiliser K, theta1~, theta1 and theta2.
 
@@ -86,7 +95,7 @@ def design_delay_free(
         Period of the sinusoidal reference in seconds.
     epsilon
         Of the factor s^2 + epsilon of Lambda, in rad^2/s^2.
-    recovery_s, sector, bandwidth
+    recovery_s, sector, bandwidth, guarantee
         Of the corrected anti-windup, see :func:`design.anti_windup.judge.compensators`; unless given, the recovery
         takes half as long as the loop's own transients at most.
 
@@ -107,7 +116,12 @@ def design_delay_free(
     units, problem = stabiliser_problem(plant, bound, period_s, epsilon)
     K, synthesis = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
     own_s = math.log(1 / SETTLED) / (2 * problem.decay_rate)
-    thesis, corrected = compensators(plant, bound, own_s, recovery_s, sector, bandwidth)
+    forward = K * plant_denominator(plant) * units.Lambda.inverse()
+    robustness = robustness_of(DelayLoop(plant_block(plant.without_delay()), forward, Block(0.0), 0.0), bound)
+    measured = model.fit.band[1] if model.fit else None
+    thesis, corrected = compensators(
+        plant, bound, own_s, recovery_s, sector, bandwidth, guarantee, robustness, measured
+    )
     return Design(
         kind="delay-free",
         plant=plant,

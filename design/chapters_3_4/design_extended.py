@@ -15,10 +15,11 @@ from design.chapters_3_4.interpolate_Q import Conditions, StableFunction, by_pol
 from design.chapters_3_4.robust_roll_off import require_possible, robust_outer_part
 from design.chapters_3_4.smith_predictor import free_part, free_part_of, stabiliser, thesis_factors
 from design.chapters_3_4.tracking import TrackingConditions, tracking_conditions
-from design.choices import ROBUST_LEVEL, SECTOR
+from design.choices import ROBUST_LEVEL
 from design.design_file import Design
 from design.parameters import ExtendedParameters, Quotient, RollOff
-from design.stability.margins import tracking_floor
+from design.stability.delay_loop import DelayLoop
+from design.stability.margins import robustness_of, tracking_floor
 from identification.base.errors import InputError
 from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
@@ -36,8 +37,9 @@ def design_extended(
     inverse_epsilon: float = 0.0,
     robust_level: float | None = None,
     recovery_s: float | None = None,
-    sector: float = SECTOR,
+    sector: float | None = None,
     bandwidth: float | None = None,
+    guarantee: str | None = None,
 ) -> Design:
     """Chapters 3 and 4 for every plant: T_so, T_si, F1, F2, K, theta1~ and theta2.
 
@@ -65,7 +67,7 @@ def design_extended(
         T_so rolls off as late as ||W_a C S|| <= robust_level < 1 allows, see
         :func:`design.chapters_3_4.robust_roll_off.robust_outer_part`. Unless given it is
         :data:`design.choices.ROBUST_LEVEL`, and T_so of the thesis's class with a given a does not roll off.
-    recovery_s, sector, bandwidth
+    recovery_s, sector, bandwidth, guarantee
         Of the corrected anti-windup, see :func:`design.anti_windup.judge.compensators`; unless given, the recovery
         takes no longer than exp(-a t) takes to 1 %.
 
@@ -92,7 +94,11 @@ def design_extended(
     K = stabiliser(plant, T_so, inverse_epsilon)
     T_si, P_o = inner_outer(plant)
     own_s = float(np.log(1 / SETTLED)) / parameters.a
-    thesis, corrected = compensators(plant, bound, own_s, recovery_s, sector, bandwidth)
+    robustness = robustness_of(DelayLoop(plant_block(plant), K, (T_so * T_si).without_delay(), plant.delay_s), bound)
+    measured = model.fit.band[1] if model.fit else None
+    thesis, corrected = compensators(
+        plant, bound, own_s, recovery_s, sector, bandwidth, guarantee, robustness, measured
+    )
     blocks = {
         "T_so": T_so,
         "T_si": T_si,

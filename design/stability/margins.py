@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from design.anti_windup.condition import Robustness
 from design.blocks.block import bound_block, plant_block
 from design.design_file import Design
 from design.stability.axis import peak
@@ -186,6 +187,17 @@ def responses(loop: DelayLoop, omega: Real) -> tuple[Complex, Complex]:
     inner = 1 - loop.feedback(s) * np.exp(-loop.delay_s * s)
     returned = inner + loop.plant(s) * loop.forward(s)
     return np.asarray(inner / returned), np.asarray(loop.forward(s) / returned)
+
+
+def robustness_of(loop: DelayLoop, bound: AdditiveBound) -> Robustness:
+    """|W_a C S| of a loop at any frequency; rational where the controller predicts its plant, C S = forward."""
+    W_a = bound_block(bound)
+    blocks = (loop.plant, loop.forward, loop.feedback, W_a)
+    return Robustness(
+        lambda omega: np.asarray(np.abs(W_a(1j * omega) * responses(loop, omega)[1])),
+        tuple(root for block in blocks for root in block.zeros + block.poles),
+        W_a * loop.forward if loop.is_predicted else None,
+    )
 
 
 def tracking_floor(plant: PlantModel, bound: AdditiveBound, omegas: ArrayLike) -> float:

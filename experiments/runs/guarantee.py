@@ -1,20 +1,22 @@
-"""What a design guarantees of its saturated runs with one anti-windup: the sector of the circle criterion, or why none.
+"""What a design guarantees of its saturated runs with one anti-windup: a sector, that windup ends, or why nothing.
 
-What the sector is good for, and which sector a run needs, says :mod:`experiments.runs.sector_promise`.
+What the sector is good for, and which sector a run needs, says :mod:`experiments.runs.sector_promise`; how much windup
+a run has left without one, :mod:`experiments.runs.windup_bound`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from design.anti_windup.circle_criterion import circle_sector
 from design.anti_windup.compensator import AntiWindup
+from design.anti_windup.kyp_certificate import Storage, proved_storage
 from design.blocks.block import bound_block, plant_block
 from design.blocks.frequency_peak import frequency_grid
 from design.design_file import Asked, Design
-from design.stability.margins import delay_loop, margins_of, responses
+from design.stability.margins import delay_loop, margins_of, robustness_of
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
@@ -29,13 +31,19 @@ class Guarantee:
     Parameters
     ----------
     sector
-        k_c: it promises something of every run that needs a smaller sector; 0: of none.
+        k_c: it promises something of every run that needs a smaller sector; 0: of none; 1: whatever the control.
     missing
         Why of none, as a sentence without its full stop; else empty.
+    any_plant
+        Whether it is one for every plant within W_a.
+    storage
+        Of a positive real 1 + theta1~ with the design's own plant; else None.
     """
 
     sector: float
     missing: str = ""
+    any_plant: bool = False
+    storage: Storage | None = field(default=None, compare=False)
 
 
 def guarantee(design: Design, anti_windup: Asked, plant: PlantModel | None = None) -> Guarantee:
@@ -52,7 +60,9 @@ def guarantee(design: Design, anti_windup: Asked, plant: PlantModel | None = Non
     if kind is None:
         return Guarantee(0.0, "there is no anti-windup")
     if plant is None or plant == design.loop_plant:
-        return _without_theta2(design, kind) or Guarantee(circle_sector(kind.theta1_tilde))
+        certificate = design.corrected.certificate if kind == design.corrected.kind else None
+        storage = None if certificate is None else proved_storage(kind.one_plus, certificate)
+        return _without_theta2(design, kind) or Guarantee(circle_sector(kind.theta1_tilde), storage=storage)
     if not _is_within(design, plant):
         return Guarantee(0.0, "the true plant is not within W_a of the design's model")
     return guarantee_within(design, kind)
@@ -74,13 +84,10 @@ def guarantee_within(design: Design, anti_windup: AntiWindup) -> Guarantee:
         reached = f"{margins.W_a_C_S.value:.3g}"
         return Guarantee(0.0, f"|W_a C S| reaches {reached}, so nothing is promised for the plants within W_a")
 
-    def robustness(omega: np.ndarray) -> np.ndarray:
-        return np.asarray(np.abs(bound(1j * omega) * responses(loop, omega)[1]))
-
-    blocks = (loop.plant, loop.forward, loop.feedback, bound_block(bound), anti_windup.one_plus)
-    roots = tuple(root for block in blocks for root in block.zeros + block.poles)
-    sector = circle_sector(anti_windup.theta1_tilde, robust_loss(anti_windup.one_plus, robustness), roots)
-    return Guarantee(sector)
+    robustness = robustness_of(loop, bound)
+    loss = robust_loss(anti_windup.one_plus, robustness.magnitude)
+    roots = robustness.roots + anti_windup.one_plus.zeros + anti_windup.one_plus.poles
+    return Guarantee(circle_sector(anti_windup.theta1_tilde, loss, roots), any_plant=True)
 
 
 def _without_theta2(design: Design, anti_windup: AntiWindup) -> Guarantee | None:

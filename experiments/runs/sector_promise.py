@@ -33,6 +33,7 @@ from experiments.engine.simulate import Run, simulate
 from experiments.runs.guarantee import Guarantee, sector_text
 from experiments.runs.references import Reference, SampledReference
 from experiments.runs.steady_control import response
+from experiments.runs.windup_bound import Windup, windup_of_run
 from identification.base.digits import told_apart
 from identification.model.plant import PlantModel
 
@@ -43,6 +44,7 @@ A_REFINEMENT = 33  # samples of each, in place of three
 CONVERGED = 1e-12
 A_PERIOD = 200  # samples of v_s in a period of the reference
 MOST_SAMPLES = 1e6
+EVENLY = 50_001  # samples of v for the bound on the windup
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,8 @@ class Verdict:
         The largest secant from v_s, and when; 0 for a run that never saturates, 1 where v_s reaches a limit.
     left_at_s
         When the run first needed more than is guaranteed; NaN: never.
+    windup
+        What a guarantee whatever the control says of the run; None for another one, and where nothing is promised.
     """
 
     guarantee: Guarantee
@@ -73,6 +77,7 @@ class Verdict:
     needed_sector: float
     needed_at_s: float
     left_at_s: float
+    windup: Windup | None = None
 
     @property
     def covered(self) -> bool:
@@ -109,6 +114,8 @@ class Verdict:
             return ""
         if self.guarantee.missing:
             return f"No guarantee: {self.guarantee.missing}; |u| reached {self.largest_control:.3g}"
+        if self.windup is not None:
+            return f"Guaranteed whatever the control: {self.windup} (|u| reached {self.largest_control:.3g})"
         if self.covered:
             return f"Covered by its guarantee: {self.needs}"
         if self.largest_steady >= self.limit:
@@ -241,7 +248,13 @@ def judge_run(
         at = np.searchsorted(time_s, [found.largest_control_at_s, found.needed_at_s, found.left_at_s])
         around = time_s[np.clip(np.add.outer([-1, 1], at), 0, len(time_s) - 1)]
         more = np.unique(np.linspace(around[0], around[1], A_REFINEMENT))
-    return found
+    if given.sector < 1 or found.needed_sector == 1:
+        return found
+    end = float(run.time_s[-1])
+    evenly = np.linspace(0.0, end, EVENLY)
+    closely = np.unique(np.concatenate([evenly, run.events_s, finely(loop, run, reference)]))
+    steady = steady_control(reference, plant, closely)
+    return replace(found, windup=windup_of_run(given, loop, limits, closely, steady))
 
 
 def finely(loop: SaturatedLoop, run: Run, reference: Reference | SampledReference) -> np.ndarray:

@@ -97,9 +97,10 @@ def sentences(design: Design, name: str, tables: Mapping[str, pd.DataFrame]) -> 
     if name in tables:
         said.insert(0, promises(tables[name]).removesuffix("."))
     thesis, corrected = design.thesis, design.corrected
+    guaranteed = "" if corrected.sector is None else f" {number(corrected.sector)}"
     said.append(
         f"theta1~: alpha = {number(thesis.alpha)} s, beta = {number(thesis.beta)} s, gamma = "
-        f"{number(thesis.gamma)} by (2.23); corrected for the sector {number(corrected.sector)}, recovery in "
+        f"{number(thesis.gamma)} by (2.23); corrected, guarantee {corrected.guarantee}{guaranteed}, recovery in "
         f"{number(corrected.judgement.recovery_s)} s"
     )
     if name == "extended" and "f_gamma" in tables:

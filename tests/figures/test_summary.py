@@ -132,9 +132,12 @@ def design_of(kind: str) -> Design:
         corrected=CorrectedCompensator(
             second_order(0.5, 0.5, -1.0),
             replace(judged, popov_sector=1.0, theta2_stable=True, recovery_s=1.75),
+            "sector",
+            "",
             0.75,
             275.0,
             0.03125,
+            None,
         ),
     )
 
@@ -238,7 +241,7 @@ W_a = 0.3 (1 + s/40) / (1 + 2 0.2 s/60 + (s/60)^2)
 It touches day_0.csv at 55.5 rad/s
 = 0.375, no stabilising controller below 0.3125. K itself is UNSTABLE
 poles of T_so -1+2j, -1-2j, -4
-gamma = 48.5 by (2.23); corrected for the sector 0.75, recovery in 1.75 s
+gamma = 48.5 by (2.23); corrected, guarantee sector 0.75, recovery in 1.75 s
 The least f of (2.23) found over beta is 0.0312
 exceeds the limits of +-6.5
 no anti-windup diverges

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from design.anti_windup.compensator import AntiWindup, anti_windup, from_one_plus, second_order, uncertainty_cost
+from design.anti_windup.condition import Sector
 from design.anti_windup.corrected_compensator import Corrected, corrected
 from design.anti_windup.judge import compensators, judge, lasting_offset, robust_sector
 from design.anti_windup.popov import popov_sector, robust_popov_sector
@@ -158,7 +159,7 @@ def test_the_least_f_of_the_printed_form_is_a_matter_of_bandwidth(implied: Ident
 
 @pytest.fixture(scope="module")
 def best(implied: IdentifiedModel) -> Corrected:
-    return corrected((0j,), implied.additive_bound, 1.0, 0.95, 960.0)
+    return corrected((0j,), implied.additive_bound, 1.0, Sector(0.95), 960.0)
 
 
 def test_the_corrected_one_keeps_what_it_states(implied: IdentifiedModel, best: Corrected) -> None:
@@ -204,10 +205,10 @@ def test_no_neighbour_of_the_corrected_one_that_meets_the_sector_is_better(
 
 def test_the_trade_off_is_monotonic(implied: IdentifiedModel) -> None:
     bound = implied.additive_bound
-    sectors = [corrected((0j,), bound, 1.0, k, 960.0).f for k in (0.8, 0.93, 0.97, 0.99, 0.999)]
+    sectors = [corrected((0j,), bound, 1.0, Sector(k), 960.0).f for k in (0.8, 0.93, 0.97, 0.99, 0.999)]
     assert all(np.diff(sectors) > -1e-4 * np.array(sectors[1:]))
     assert sectors[-1] > 2 * sectors[0]
-    widths = [corrected((0j,), bound, 1.0, 0.95, B).f for B in (100.0, 200.0, 400.0)]
+    widths = [corrected((0j,), bound, 1.0, Sector(0.95), B).f for B in (100.0, 200.0, 400.0)]
     assert all(np.diff(widths) < 0)
 
 
@@ -224,7 +225,7 @@ def test_without_a_bandwidth_the_corrected_class_has_no_optimum(implied: Identif
 def test_other_plants_and_bounds(integrators: int, order: int) -> None:
     poles = [Mode(30.0, 0.05), Mode(4.0, 0.3)][: order // 2]
     bound = AdditiveBound(0.02, (), tuple(poles), (3.0,) * (order > 1), (9.0,) * (order % 2))
-    found = corrected((0j,) * integrators, bound, 2.0, 0.9, 60.0)
+    found = corrected((0j,) * integrators, bound, 2.0, Sector(0.9), 60.0)
     kind = found.anti_windup
     assert kind.one_plus.zeros.count(0j) == integrators
     assert found.f_lower <= found.f <= 1.001 * found.f_lower
@@ -235,16 +236,16 @@ def test_other_plants_and_bounds(integrators: int, order: int) -> None:
 
 def test_an_unstable_plant_pole_is_a_zero_of_one_plus_theta1() -> None:
     bound = AdditiveBound.printed_form(0.01, 5.0, 20.0, 0.05)
-    kind = corrected((0.5 + 0j,), bound, 1.0, 0.6, 50.0).anti_windup
+    kind = corrected((0.5 + 0j,), bound, 1.0, Sector(0.6), 50.0).anti_windup
     assert abs(complex(kind.one_plus(0.5))) < 1e-12
 
 
 @pytest.mark.parametrize(
     ("numbers", "sentence"),
     [
-        ((0.0, 0.9, 100.0), "expected a positive time and 0 < sector < 1"),
-        ((1.0, 1.0, 100.0), "expected a positive time and 0 < sector < 1"),
-        ((1.0, float("nan"), 100.0), "expected a positive time and 0 < sector < 1"),
+        ((0.0, 0.9, 100.0), "the recovery time is 0 s; expected a positive one"),
+        ((1.0, 1.0, 100.0), "the sector is 1; expected 0 < sector < 1"),
+        ((1.0, float("nan"), 100.0), "the sector is nan; expected 0 < sector < 1"),
         ((1.0, 0.9, float("inf")), "bandwidth of the anti-windup is inf rad/s; expected 4.60517 or more"),
         ((1.0, 0.9, 2.0), "bandwidth of the anti-windup is 2 rad/s; expected 4.60517 or more and a finite one"),
     ],
@@ -253,13 +254,13 @@ def test_a_corrected_one_out_of_range_is_refused(
     implied: IdentifiedModel, numbers: tuple[float, float, float], sentence: str
 ) -> None:
     with pytest.raises(InputError, match=sentence):
-        corrected((0j,), implied.additive_bound, *numbers)
+        corrected((0j,), implied.additive_bound, numbers[0], Sector(numbers[1]), numbers[2])
 
 
 def test_a_sector_that_nothing_meets_is_refused() -> None:
     bound = AdditiveBound.printed_form(0.01, 5.0, 20.0, 0.05)
     with pytest.raises(InputError, match=r"meets the sector 0\.999"):
-        corrected((5.0 + 0j,), bound, 1.0, 0.999, 50.0)
+        corrected((5.0 + 0j,), bound, 1.0, Sector(0.999), 50.0)
 
 
 def test_the_robust_sector_shrinks_with_the_uncertainty(best: Corrected) -> None:
@@ -312,12 +313,12 @@ def test_never_worse_than_the_plain_washout(implied: IdentifiedModel) -> None:
     for bandwidth in (10.0, 20.0, 50.0, 300.0):
         plain = from_one_plus(Block(1.0, (0j,), (complex(-bandwidth),)))
         f = uncertainty_cost(bound, plain.one_plus)[0]
-        assert corrected((0j,), bound, 1.15, 0.95, bandwidth).f <= f * (1 + 1e-9)
+        assert corrected((0j,), bound, 1.15, Sector(0.95), bandwidth).f <= f * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("sector", [0.9999, 0.999999])
 def test_a_sector_close_to_one(implied: IdentifiedModel, sector: float) -> None:
-    found = corrected((0j,), implied.additive_bound, 1.15, sector, 960.0)
+    found = corrected((0j,), implied.additive_bound, 1.15, Sector(sector), 960.0)
     assert popov_sector(found.anti_windup.theta1_tilde)[0] >= sector
     assert found.f < 2.2
 
@@ -326,7 +327,7 @@ def test_a_sector_close_to_one(implied: IdentifiedModel, sector: float) -> None:
 def test_the_size_of_the_bound_does_not_matter(implied: IdentifiedModel, scale: float) -> None:
     bound = implied.additive_bound
     scaled = AdditiveBound.printed_form(bound.gain * scale, bound.corner, bound.resonance.omega, bound.resonance.zeta)
-    here, there = (corrected((0j,), each, 1.15, 0.95, 960.0) for each in (bound, scaled))
+    here, there = (corrected((0j,), each, 1.15, Sector(0.95), 960.0) for each in (bound, scaled))
     assert there.f == pytest.approx(scale * here.f, rel=1e-6)
 
 
@@ -341,7 +342,7 @@ def test_the_size_of_the_bound_does_not_matter(implied: IdentifiedModel, scale: 
     ids=["slow resonances", "four real poles", "three resonances"],
 )
 def test_there_is_always_one_for_an_integrator(bound: AdditiveBound, recovery_s: float) -> None:
-    found = corrected((0j,), bound, recovery_s, 0.95, 9600.0)
+    found = corrected((0j,), bound, recovery_s, Sector(0.95), 9600.0)
     assert popov_sector(found.anti_windup.theta1_tilde)[0] >= 0.95
     assert found.f <= 1.01 * found.f_lower
 

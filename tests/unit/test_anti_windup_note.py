@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from design.anti_windup.compensator import from_one_plus, second_order
+from design.anti_windup.condition import Sector
 from design.anti_windup.corrected_compensator import corrected
 from design.anti_windup.judge import judge, lasting_offset
 from design.anti_windup.popov import popov_sector
@@ -134,7 +135,7 @@ def test_a_slow_recovery_centres_the_error_where_the_limits_are_too_small(delay_
     time_s = np.linspace(0.0, 48.0, 9601)
     peaks = []
     for recovery_s in (0.3, 3.0, 30.0):
-        kind = corrected((0j,), delay_free_design.additive_bound, recovery_s, 0.95, 960.0).anti_windup
+        kind = corrected((0j,), delay_free_design.additive_bound, recovery_s, Sector(0.95), 960.0).anti_windup
         error = simulate(design_loop(delay_free_design, reference, kind), (-10.0, 10.0), time_s).outputs["error"]
         peaks.append(np.abs(error[time_s > 44]).max())
     assert peaks[0] > peaks[1] > peaks[2] > 1.3938

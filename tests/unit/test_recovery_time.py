@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from design.anti_windup.condition import Sector
 from design.anti_windup.corrected_compensator import RESOLVED, SETTLED, WORTH, corrected
 from design.blocks.block import bound_block
 from design.blocks.frequency_peak import block_norm
@@ -39,7 +40,7 @@ def least_f(
 ) -> tuple[float, float]:
     """f and its lower bound; both infinite where nothing meets the sector."""
     try:
-        found = corrected((0j,) * integrators, bound, recovery_s, sector, bandwidth)
+        found = corrected((0j,) * integrators, bound, recovery_s, Sector(sector), bandwidth)
     except InputError:
         return np.inf, np.inf
     slowest = min((-pole.real for pole in found.anti_windup.one_plus.poles), default=np.inf)

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from design.anti_windup.compensator import second_order
+from design.anti_windup.condition import Sector
 from design.anti_windup.corrected_compensator import SETTLED, corrected
 from design.anti_windup.judge import judge
 from design.anti_windup.thesis_compensator import least_f
@@ -43,7 +44,7 @@ def trade_off_tables(design: Design, tick: Callable[[], object] = lambda: None) 
     for recovery_s in np.geomspace(3 * np.log(1 / SETTLED) / bandwidth, 5 * own, RECOVERIES):
         for sector in SECTORS:
             try:
-                f = corrected(unstable, bound, float(recovery_s), sector, bandwidth).f
+                f = corrected(unstable, bound, float(recovery_s), Sector(sector), bandwidth).f
             except InputError:  # nothing meets the sector
                 f = np.nan
             rows.append((sector, recovery_s, f, bandwidth))

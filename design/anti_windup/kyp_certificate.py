@@ -1,0 +1,207 @@
+"""A storage function of M = 1 + theta1~, which proves that M is positive real, and bounds the windup that is left.
+
+M = 1 + C (sI - A)^-1 b with the poles -p_k, real ones, as a chain: x_1' = p_1 (u~ - x_1), x_k' = p_k (x_(k-1) - x_k).
+Its output is w = M u~ = C x + u~. A storage function is V = x'P x with a positive definite P and
+
+    dV/dt <= 2 u~ w   for every x and u~, that is   [-(A'P + P A), C' - P b; C - b'P, 2] >= 0   (KYP lemma).
+
+With M(0) = 0 the matrix has the kernel (-A^-1 b, 1), which takes P A^-1 b = -(C A^-1)', and is not negative where
+-(A'P + P A) > 0. Every number here is rational, so that definiteness is decided by determinants without rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from flint import ctx, fmpq, fmpq_mat, fmpq_poly
+from scipy.linalg import solve_continuous_lyapunov
+
+from design.blocks.block import Block
+from design.blocks.positivity import (
+    combined,
+    multiplied,
+    not_positive_at,
+    popov_polynomial,
+    real_polynomial,
+    squared_magnitude,
+    squared_on_axis,
+)
+from identification.base.arrays import Real
+from identification.base.errors import InputError
+
+SLACK = Fraction(1, 10**4)  # least eigenvalue of -(A'P + P A), at first
+LEAST_SLACK = Fraction(1, 10**11)  # rounding would hide a smaller one
+MOVED = 1e-6  # of P, by which it may be moved to be exact
+BITS = 256  # of the roots of the spectral factor
+
+Rows = tuple[tuple[float, ...], ...]
+"""P in double precision, which :func:`proved_storage` makes exact."""
+
+
+@dataclass(frozen=True)
+class Storage:
+    """V = x'P x of a chain with the input u~ and the output w = C x + u~; dV/dt <= 2 u~ w is proved for exact numbers.
+
+    Parameters
+    ----------
+    A, b, C, P
+        Shapes (n, n), (n,), (n,), (n, n), rounded from the exact ones; x in the input's unit, P in seconds.
+    """
+
+    A: Real
+    b: Real
+    C: Real
+    P: Real
+
+    @property
+    def steepness(self) -> float:
+        """c with |C x| <= c V^(1/2) for every x, c^2 = C P^-1 C', in 1/s^(1/2)."""
+        return float(np.sqrt(self.C @ np.linalg.solve(self.P, self.C))) if len(self.C) else 0.0
+
+    def value(self, x: Real) -> Real:
+        """V at states of shape (s, n), shape (s,), in the square of the input's unit times seconds."""
+        return np.asarray(np.einsum("si,ij,sj->s", x, self.P, x))
+
+
+def certificate(M: Block) -> Rows:
+    """P of a positive real M with real poles, the one with the least :attr:`Storage.steepness` but for rounding.
+
+    Raises
+    ------
+    InputError
+        M is not strictly positive real but for a simple zero at s = 0, or a pole is not real.
+
+    Notes
+    -----
+    2 Re M = |g|^2 + slack |z|^2 on the axis, z being x, or x + A^-1 b u~ where M(0) = 0, and u~: g is a polynomial over
+    the denominator of M, a spectral factor, and P solves A'P + P A = -(l l' + slack I) with the row l of g. Of all P
+    those of the factors with every zero on one side are the extremal ones (Willems, 1971): the zeros to the right give
+    the largest P, so that C P^-1 C' is least.
+    """
+    rates, at_zero, n = _rates(M), M.zeros.count(0j), len(M.poles)
+    real, size = popov_polynomial(M, 0.0), [Fraction(0)] if at_zero else squared_magnitude(M.poles)
+    for k in range(1, n + 1):
+        slower = real_polynomial(M.poles[:k])
+        above = combined(Fraction(1), slower[:1], Fraction(-at_zero), slower)
+        size = combined(
+            Fraction(1), size, Fraction(1), squared_on_axis(multiplied(above, real_polynomial(M.poles[k:])))
+        )
+    slack = SLACK
+    while not_positive_at(factored := combined(Fraction(2), real, -slack, size)[at_zero:]) is not None:
+        slack /= 10
+        if at_zero > 1 or slack < LEAST_SLACK:
+            raise InputError(f"1 + theta1~ with the zeros {M.zeros} is not positive real; expected Re M > 0")
+    with ctx.workprec(BITS):
+        found: Any = fmpq_poly([_exact(value) for value in factored]).complex_roots()
+        roots = [complex((-root).sqrt()) for root, multiplicity in found for _ in range(multiplicity)]
+    g = np.atleast_1d(np.real(np.poly([*roots, *(0.0,) * at_zero]))) * np.sqrt(float(factored[-1]))
+    row = _floats(_along_chain([Fraction(value) for value in g[::-1]], rates)[1])
+    A = _floats(_chain(rates)[0])
+    P = solve_continuous_lyapunov(A.T, -row.T @ row - float(slack) * np.eye(n)) if n else np.zeros((0, 0))
+    return tuple(tuple(each) for each in ((P + P.T) / 2).tolist())
+
+
+def proved_storage(M: Block, rows: Rows) -> Storage:
+    """The storage function of a certificate, proved in exact arithmetic for the roots that M holds.
+
+    Parameters
+    ----------
+    M
+        1 + theta1~, with real poles.
+    rows
+        P, shape (n, n), symmetric, n the number of poles. Where M(0) = 0 it is moved by a symmetric matrix of rank two
+        to the nearest one that meets P A^-1 b = -(C A^-1)'.
+
+    Raises
+    ------
+    InputError
+        It is no certificate of this M.
+    """
+    rates, n, at_zero = _rates(M), len(M.poles), M.zeros.count(0j)
+    if len(rows) != n or any(len(row) != n for row in rows) or rows != tuple(zip(*rows, strict=True)):
+        raise InputError(f"the certificate of the anti-windup is no symmetric matrix; expected one with {n} rows")
+    P = fmpq_mat(n, n, [_exact(Fraction(value)) for row in rows for value in row])
+    at_infinity, C = _along_chain(real_polynomial(M.zeros), rates)
+    A, b = _chain(rates)
+    if n and at_zero:
+        settled = fmpq_mat(n, 1, [1] * n)  # -A^-1 b
+        missing = (C * A.inv()).transpose() - P * settled
+        both, twice = missing * settled.transpose(), settled.transpose() * missing
+        moved = (both + both.transpose()) * fmpq(1, n) - settled * twice * settled.transpose() * fmpq(1, n**2)
+        if np.abs(_floats(moved)).max() > MOVED * np.abs(_floats(P)).max():
+            raise InputError("the certificate of the anti-windup does not meet P A^-1 b = -(C A^-1)'")
+        P += moved
+    supplied = -1 * (A.transpose() * P + P * A)
+    if not at_zero:
+        supplied = _bordered(supplied, C.transpose() - P * b)
+    if at_zero > 1 or at_infinity != 1 or M.gain != 1 or not (_is_definite(P) and _is_definite(supplied)):
+        raise InputError("the certificate of the anti-windup does not prove that 1 + theta1~ is positive real")
+    return Storage(_floats(A), _floats(b)[:, 0], _floats(C)[0], _floats(P))
+
+
+def _rates(M: Block) -> list[Fraction]:
+    """The p_k, exactly."""
+    if any(pole.imag or pole.real >= 0 for pole in M.poles) or len(M.zeros) != len(M.poles):
+        raise InputError(
+            "1 + theta1~ has complex or unstable poles, or another number of zeros; a certificate has none"
+        )
+    return [Fraction(-pole.real) for pole in M.poles]
+
+
+def _chain(rates: Sequence[Fraction]) -> tuple[fmpq_mat, fmpq_mat]:
+    """A and b of the chain."""
+    n = len(rates)
+    A = fmpq_mat(n, n)
+    for k, rate in enumerate(rates):
+        A[k, k] = -_exact(rate)
+        if k:
+            A[k, k - 1] = _exact(rate)
+    return A, fmpq_mat(n, 1, [_exact(rate) if k == 0 else 0 for k, rate in enumerate(rates)])
+
+
+def _along_chain(numerator: Sequence[Fraction], rates: Sequence[Fraction]) -> tuple[Fraction, fmpq_mat]:
+    """A numerator of degree n over the denominator: its value at infinity, and its row over the chain's states.
+
+    The numerator is divided by s + p_n, what comes out by s + p_(n-1), and so on: the remainders are those of
+    prod_(i > k) (s + p_i), so that they belong to x_k but for prod_(i <= k) p_i.
+    """
+    left, remainders = list(numerator), []
+    for rate in reversed(rates):
+        value, quotient = Fraction(0), []
+        for coefficient in reversed(left):
+            value = coefficient - rate * value
+            quotient.append(value)
+        remainders.append(value)
+        left = quotient[-2::-1]
+    row = []
+    gain = Fraction(1)
+    for rate, remainder in zip(rates, reversed(remainders), strict=True):
+        gain *= rate
+        row.append(_exact(remainder / gain))
+    return left[0], fmpq_mat(1, len(row), row)
+
+
+def _bordered(matrix: fmpq_mat, column: fmpq_mat) -> fmpq_mat:
+    """The symmetric matrix with one more row and column, whose diagonal entry is 2."""
+    n = matrix.nrows()
+    rows = [[matrix[i, j] for j in range(n)] + [column[i, 0]] for i in range(n)]
+    rows.append([column[j, 0] for j in range(n)] + [fmpq(2)])
+    return fmpq_mat(n + 1, n + 1, [value for row in rows for value in row])
+
+
+def _is_definite(matrix: fmpq_mat) -> bool:
+    """Whether a symmetric matrix is positive definite: every leading principal minor is positive (Sylvester)."""
+    n = matrix.nrows()
+    return all(fmpq_mat(k, k, [matrix[i, j] for i in range(k) for j in range(k)]).det() > 0 for k in range(1, n + 1))
+
+
+def _floats(matrix: fmpq_mat) -> Real:
+    return np.array([int(value.p) / int(value.q) for value in matrix.entries()]).reshape(matrix.nrows(), matrix.ncols())
+
+
+def _exact(value: Fraction) -> fmpq:
+    return fmpq(value.numerator, value.denominator)
