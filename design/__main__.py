@@ -64,19 +64,30 @@ def main() -> None:
 
 @main.command("delay-free")
 @click.argument("model")
-@click.option("--period", type=float, required=True, help="Period of the sinusoidal reference in seconds.")
 @click.option(
-    "--epsilon",
+    "--period",
+    "periods",
     type=float,
+    multiple=True,
     required=True,
-    help="Of the factor s^2 + epsilon of Lambda, rad^2/s^2.",
+    help="Period of the sinusoidal reference in seconds; once for each sinusoid.",
+)
+@click.option(
+    "--epsilon", type=float, help="Of the factor s^2 + epsilon of Lambda, rad^2/s^2; constants are held nearly."
+)
+@click.option(
+    "--integral-action",
+    is_flag=True,
+    help="Ours, in place of --epsilon: constant references and constant disturbances at the plant's input leave no "
+    "error; the plant's integrators are not hidden.",
 )
 @corrected_options
 @OUTPUT
 def delay_free(
     model: str,
-    period: float,
-    epsilon: float,
+    periods: tuple[float, ...],
+    epsilon: float | None,
+    integral_action: bool,
     recovery: float | None,
     guarantee: str | None,
     sector: float | None,
@@ -87,11 +98,19 @@ def delay_free(
     from design.asked_model import asked_model
     from design.chapter_2.design_delay_free import design_delay_free
 
+    if (epsilon is None) != integral_action:
+        found = "both are given" if integral_action else "none is given"
+        raise InputError(f"of --epsilon and --integral-action {found}; expected one of them")
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
-    design = design_delay_free(given, period, epsilon, recovery, sector, bandwidth, guarantee)
+    design = design_delay_free(given, periods, epsilon, recovery, sector, bandwidth, guarantee)
     hinf = design.hinf
     assert hinf is not None
+    hidden = 0 if integral_action else given.plant.integrators
+    drift = (
+        f"\n  C hides {'the integrator' if hidden == 1 else 'both integrators'} of the plant: y drifts under a "
+        "constant disturbance at its input; --integral-action prevents that"
+    )
     unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
     _finish(
         design,
@@ -99,7 +118,7 @@ def delay_free(
         output,
         f"H-infinity stabiliser: ||[W1 S; W2 T]|| = {upper_end(hinf.gamma, 4)}, no stabilising controller below "
         f"{lower_end(hinf.gamma_lower, 4)}; every closed-loop pole left of -{lower_end(hinf.decay_rate, 4)} 1/s"
-        f"{unstable}",
+        f"{unstable}{drift if hidden else ''}",
     )
 
 

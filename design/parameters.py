@@ -16,14 +16,11 @@ class DelayFreeParameters:
 
     Parameters
     ----------
-    period_s
-        Of the sinusoidal reference in seconds.
     epsilon
-        Of the factor s^2 + epsilon of Lambda, in rad^2/s^2.
+        Of the factor s^2 + epsilon of Lambda, in rad^2/s^2; None for integral action.
     """
 
-    period_s: float
-    epsilon: float
+    epsilon: float | None
 
     def to_dict(self) -> dict[str, Any]:
         """The ``parameters`` of design.json."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TypeVar
 
 from flint import acb, acb_poly, arb, arb_poly, ctx
@@ -92,6 +93,25 @@ def shared(first: Iterable[complex], second: Iterable[complex]) -> tuple[list[co
     return common, left, right
 
 
+def reflected(
+    first: Iterable[complex], second: Iterable[complex], decay_rate: float
+) -> tuple[list[complex], list[complex], list[complex]]:
+    """The roots of ``second`` that are exact mirror images of roots of ``first``, and what is left of each.
+
+    The mirror is the line Re s = -decay_rate. On it s minus a root and s minus its image have the same modulus.
+    """
+    images, left, right = [], [], list(second)
+    for root in first:
+        mirrored_real = -2 * Fraction(decay_rate) - Fraction(root.real)
+        image = next((each for each in right if each.imag == root.imag and each.real == mirrored_real), None)
+        if image is None:
+            left.append(root)
+        else:
+            right.remove(image)
+            images.append(image)
+    return images, left, right
+
+
 def from_roots(roots: Iterable[acb]) -> arb_poly:
     """The real polynomial prod(x - root), complex roots by one of each pair."""
     product = arb_poly([1])
@@ -167,7 +187,7 @@ def _disc(p: acb_poly, slope: acb_poly, z: acb, degree: int) -> acb:
     return z + acb(arb(0, radius), arb(0, radius))
 
 
-def right_half_plane_roots(even: arb_poly) -> list[acb]:
+def right_half_plane_roots(squares: Iterable[acb]) -> list[acb]:
     """The square roots with positive real part of the roots of a polynomial in x^2.
 
     Raises
@@ -175,7 +195,7 @@ def right_half_plane_roots(even: arb_poly) -> list[acb]:
     UndecidedError
         A root is not told from the imaginary axis.
     """
-    found = [root.sqrt() for root in polynomial_roots(even)]
+    found = [square.sqrt() for square in squares]
     if not all(root.real > 0 for root in found):
         raise UndecidedError("a root is on the imaginary axis")
     return found

@@ -162,48 +162,6 @@ def plant_denominator(plant: PlantModel) -> Block:
     return Block(1.0, (0j,) * plant.integrators) * mode_product(1.0, plant.pole_modes, plant.real_poles)
 
 
-def require_thesis_class(plant: PlantModel, excess: int = 0) -> None:
-    """Refuse a plant that is not an integrator times a proper, stable and minimum phase G: the designs' class (2.20).
-
-    Parameters
-    ----------
-    plant
-        The plant.
-    excess
-        How many poles more than zeros it may have beside the integrator.
-
-    Raises
-    ------
-    InputError
-        There is not exactly one integrator, a zero lies in the right half plane, or the plant has more zeros than poles
-        or too many poles.
-    """
-    if plant.integrators != 1:
-        at_zero = "a zero" if plant.integrators == -1 else f"{-plant.integrators} zeros"
-        found = f"{plant.integrators} integrators" if plant.integrators >= 0 else f"{at_zero} at s = 0"
-        raise InputError(
-            f"the plant has {found}; the design expects exactly one integrator, Eq. (2.20): Lemma 1, (3.2) and (3.16) "
-            "are for one"
-        )
-    if plant.right_zeros:
-        zero = min(plant.right_zeros, key=abs)
-        at = f"{zero.real:.4g}" + (f" +- {abs(zero.imag):.4g}j" if zero.imag else "")
-        raise InputError(
-            f"the plant has a zero in the right half plane, at {at} rad/s; the design expects none, Eq. (2.20): "
-            "its controller has the plant's zeros as poles"
-        )
-    zeros, poles = (
-        2 * len(modes) + len(rates)
-        for modes, rates in ((plant.zero_modes, plant.real_zeros), (plant.pole_modes, plant.real_poles))
-    )
-    if not 0 <= poles - zeros <= excess:
-        more = f"or up to {excess} poles more" if excess else "or its controller is improper"
-        raise InputError(
-            f"beside its integrator the plant has {zeros} zeros and {poles} poles; the design expects equally many, "
-            f"{more}"
-        )
-
-
 def plant_block(plant: PlantModel) -> Block:
     """P(s) = B(s)/A(s) exp(-h s) as a block, Thesis Eq. (2.3) and, with its dead time, (3.11)."""
     rational = plant_numerator(plant) * plant_denominator(plant).inverse()

@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from design.anti_windup.corrected_compensator import SETTLED
 from design.anti_windup.judge import compensators
-from design.blocks.block import (
-    Block,
-    bound_block,
-    plant_block,
-    plant_denominator,
-    plant_numerator,
-    require_thesis_class,
-)
-from design.chapter_2.internal_model import InternalModel, internal_model, reference_polynomial
+from design.blocks.block import Block, bound_block, plant_block, plant_denominator, plant_numerator
+from design.chapter_2.internal_model import InternalModel, internal_model
 from design.design_file import Design
 from design.hinf.mixed_sensitivity import mixed_sensitivity
 from design.hinf.pick import Problem
@@ -32,7 +26,7 @@ TRACKING = 0.01  # W1 asks for |S| below gamma times this at the reference's fre
 
 
 def stabiliser_problem(
-    plant: PlantModel, bound: AdditiveBound, period_s: float, epsilon: float
+    plant: PlantModel, bound: AdditiveBound, period_s: float | Sequence[float], epsilon: float | None
 ) -> tuple[InternalModel, Problem]:
     """The internal model units, and what the stabiliser K has to minimise.
 
@@ -54,32 +48,37 @@ def stabiliser_problem(
     exceeds deg B it gets as many zeros, an octave above the fastest root, as make W2 G_A biproper.
 
     W1 has the reference's poles, damped: moved left by twice the decay rate, which makes the stabiliser's
-    zeros there cancel, and W1(0) = 1/TRACKING. The decay rate leaves SETTLED of a transient after one period,
+    zeros there cancel, and W1(0) = 1/TRACKING. The decay rate leaves SETTLED of a transient after the longest period,
     or is half that of the slowest mode of plant and bound where these decay more slowly.
     """
-    if not (math.isfinite(period_s) and period_s > 0):
-        raise InputError(f"the period is {period_s:g} s; expected a positive number")
-    plant = plant.without_delay()
-    require_thesis_class(plant)
-    omega = 2 * math.pi / period_s
-    units = internal_model(plant, omega, epsilon)
+    plant, omegas = plant.without_delay(), reference_omegas(period_s)
     A, B, W_a = plant_denominator(plant), plant_numerator(plant), bound_block(bound)
+    units = internal_model(plant, omegas, epsilon, roll_off=0 if W_a.relative_degree else 1)
     slowest = min(-root.real for root in A.zeros + B.zeros + W_a.poles if root != 0)
-    decay_rate = min(math.log(1 / SETTLED) / period_s, slowest / 2)
+    decay_rate = min(math.log(1 / SETTLED) / float(np.max(period_s)), slowest / 2)
 
     fastest = max(abs(root) for root in A.zeros + B.zeros + W_a.poles + units.Lambda.zeros)
     W2 = W_a * A * B.inverse()
     missing = (W2 * units.G_A).relative_degree
     W2 = W2 * Block((2 * fastest) ** -missing, (complex(-2 * fastest),) * missing)
-    damped = tuple(root - 2 * decay_rate for root in reference_polynomial(omega, epsilon).zeros)
+    damped = tuple(root - 2 * decay_rate for root in units.reference.zeros)
     W1 = Block(float(np.prod(np.abs(damped))) / TRACKING, (), damped)
     return units, Problem(units.G_A, W1, W2, decay_rate)
 
 
+def reference_omegas(period_s: float | Sequence[float]) -> tuple[float, ...]:
+    """The angular frequencies in rad/s of periods in s; raises InputError at the first that is no positive number."""
+    periods = np.atleast_1d(np.asarray(period_s, dtype=float))
+    for period in periods:
+        if not (math.isfinite(period) and period > 0):
+            raise InputError(f"the period is {period:g} s; expected a positive number")
+    return tuple(2 * math.pi / float(period) for period in periods)
+
+
 def design_delay_free(
     model: IdentifiedModel,
-    period_s: float,
-    epsilon: float,
+    period_s: float | Sequence[float],
+    epsilon: float | None,
     recovery_s: float | None = None,
     sector: float | None = None,
     bandwidth: float | None = None,
@@ -92,9 +91,10 @@ def design_delay_free(
     model
         P (its dead time is ignored, as the thesis does) and W_a.
     period_s
-        Period of the sinusoidal reference in seconds.
+        Period of the sinusoidal reference in seconds; several for a sum of sinusoids, each once.
     epsilon
-        Of the factor s^2 + epsilon of Lambda, in rad^2/s^2.
+        Of the factor s^2 + epsilon of Lambda, in rad^2/s^2. None for integral action, which is ours: Lambda has
+        s^(integrators + 1) in place of that factor.
     recovery_s, sector, bandwidth, guarantee
         Of the corrected anti-windup, see :func:`design.anti_windup.judge.compensators`; unless given, the recovery
         takes half as long as the loop's own transients at most.
@@ -102,15 +102,16 @@ def design_delay_free(
     Raises
     ------
     InputError
-        A number is out of its range, or the plant has more pole modes than zero modes, for which 1 + F and
-        W2 G_A lose the degrees that the construction needs.
+        A number is out of its range, or the plant has zeros at s = 0 or in the right half plane, or a pole there.
     SynthesisError
         The synthesis failed its own check.
 
     Notes
     -----
-    C = K A/Lambda has a zero at the plant's pole s = 0 (A(0) = 0; Lemma 1 assumes a stable A): the integrator is
-    hidden from the loop and not stabilised, so that a constant disturbance at the plant's input makes y drift.
+    With epsilon C = K A/Lambda has a zero at each of the plant's poles s = 0 (Lemma 1 assumes a stable A): the
+    integrators are hidden from the loop and not stabilised, so that a constant disturbance at the plant's input makes y
+    drift. With integral action Lambda holds these poles and one more, so that C has a pole at s = 0: a constant
+    reference and a constant disturbance at the plant's input leave no error.
     """
     plant, bound = model.plant, model.additive_bound
     units, problem = stabiliser_problem(plant, bound, period_s, epsilon)
@@ -126,7 +127,7 @@ def design_delay_free(
         kind="delay-free",
         plant=plant,
         additive_bound=bound,
-        reference_omegas=(2 * math.pi / period_s,),
+        reference_omegas=reference_omegas(period_s),
         blocks={
             "Lambda": units.Lambda,
             "F1": units.F1,
@@ -138,7 +139,7 @@ def design_delay_free(
             "theta2": thesis.kind.theta2(plant.without_delay()),  # Eq. (2.18)
         },
         hinf=synthesis,
-        parameters=DelayFreeParameters(period_s, epsilon),
+        parameters=DelayFreeParameters(epsilon),
         thesis=thesis,
         corrected=corrected,
     )

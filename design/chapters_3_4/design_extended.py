@@ -80,7 +80,7 @@ def design_extended(
     plant, bound = model.plant, model.additive_bound
     omegas = tuple(float(omega) for omega in reference_omegas)
     own_level = robust_level is None and a is not None
-    as_printed = own_level and _has_free_part(plant) and (plant.relative_degree == 1 or inverse_epsilon > 0)
+    as_printed = own_level and is_of_thesis_class(plant) and (plant.relative_degree == 1 or inverse_epsilon > 0)
     if not as_printed and (method != "zeros" or inverse_epsilon):
         raise InputError(
             "a design with a roll-off, or of a chosen a, is by the zeros of Q with the exact inverse; found "
@@ -110,7 +110,7 @@ def design_extended(
         "theta1_tilde": thesis.kind.theta1_tilde,
         "theta2": thesis.kind.theta2(plant),
     }
-    if _has_free_part(plant):
+    if is_of_thesis_class(plant):
         free = free_part_of(T_so, parameters.a)
         K_0, K_1 = thesis_factors(plant, T_so, inverse_epsilon)
         blocks = {"Q": free.Q, "C0": free.C_0, "K0": K_0, "K1": K_1} | blocks
@@ -127,8 +127,8 @@ def design_extended(
     )
 
 
-def _has_free_part(plant: PlantModel) -> bool:
-    """Whether C_0 is for 1/s, Thesis Eq. (2.20): one integrator, and no other root in Re s >= 0."""
+def is_of_thesis_class(plant: PlantModel) -> bool:
+    """Whether a plant has one integrator and no other root in Re s >= 0, Thesis Eq. (2.20): then C_0 is for 1/s."""
     return plant.integrators == 1 and not plant.right_zeros and not plant.unstable_poles
 
 
@@ -168,7 +168,7 @@ def _rolled_off(
         if found.order
         else f"T_so needs no roll-off: |W_a C S| is at most {found.peak:.3g} <= {level:g} as it is"
     )
-    own = _designs(conditions(omegas, plant.delay_s, a), pairs) if _has_free_part(plant) else {}
+    own = _designs(conditions(omegas, plant.delay_s, a), pairs) if is_of_thesis_class(plant) else {}
     roll_off = RollOff(level, found.order, found.rate)
     return found.T_so, ExtendedParameters(a, tuple(pairs), "zeros", 0.0, _tried(own), roll_off, tuple(reasons))
 

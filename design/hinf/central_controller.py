@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from flint import acb, acb_mat, acb_poly, arb_poly, ctx
 
-from design.blocks.ball import UndecidedError, decided, in_x, mirrored, polynomial_roots, shared
+from design.blocks.ball import UndecidedError, decided, in_x, mirrored, polynomial_roots, reflected, shared
 from design.blocks.block import Block
-from design.hinf.pick import Problem, Setting, level_of, nu_of, pick_matrix, setting_of, values_of
+from design.hinf.pick import Problem, Setting, level_of, nu_of, orders_of, pick_matrix, setting_of, values_of
 
 
 def central_controller(problem: Problem, gamma: float) -> Block | None:
@@ -27,15 +27,17 @@ def central_controller(problem: Problem, gamma: float) -> Block | None:
 
         E = sum(a_l/(s + conj(s_l)))/(1 + sum(conj(e_l) a_l/(s + conj(s_l)))),
 
-    and K = T/(1 - T)/G; what cancels in it by construction is divided out before the roots are found. It is the
-    central controller of the two Riccati equations (K. Glover and J. C. Doyle, Systems & Control Letters 11 (1988)
-    167-172).
+    and K = T/(1 - T)/G; what cancels in it by construction is divided out before the roots are found. A point that is
+    repeated has the next Taylor coefficients, in conj(s_l), of 1/(s + conj(s_l)) and conj(E(s_l))/(s + conj(s_l)). It
+    is the central controller of the two Riccati equations (K. Glover and J. C. Doyle, Systems & Control Letters 11
+    (1988) 167-172).
     """
     return decided(lambda: _central_controller(setting_of(problem, ctx.prec), problem, gamma))
 
 
 def _central_controller(setting: Setting, problem: Problem, gamma: float) -> Block:
-    nu = nu_of(level_of(setting, gamma))
+    level = level_of(setting, gamma)
+    nu = nu_of(level, polynomial_roots(level))
     points, values = setting.points, values_of(setting, nu)
     count = len(points)
     matrix = acb_mat(count, count, [entry for row in pick_matrix(points, values) for entry in row])
@@ -46,9 +48,17 @@ def _central_controller(setting: Setting, problem: Problem, gamma: float) -> Blo
     full = acb_poly([1])
     for s in points:
         full *= acb_poly([s.conjugate(), 1])
-    terms = [weight * (full // acb_poly([s.conjugate(), 1])) for weight, s in zip(weights, points, strict=True)]
-    E_numerator = _real(sum(terms, acb_poly([0])))
-    E_denominator = _real(sum((e.conjugate() * term for e, term in zip(values, terms, strict=True)), full))
+    orders = orders_of(points)
+    kernels = [
+        (-1) ** order * (full // acb_poly([s.conjugate(), 1]) ** (order + 1))
+        for s, order in zip(points, orders, strict=True)
+    ]
+    above, below = acb_poly([0]), full
+    for k, (weight, order) in enumerate(zip(weights, orders, strict=True)):
+        above += weight * kernels[k]
+        for i in range(order + 1):
+            below += weight * values[k - order + i].conjugate() * kernels[k - i]
+    E_numerator, E_denominator = _real(above), _real(below)
 
     d1, d2, nc = setting.d1, setting.d2, setting.nc
     T = E_numerator * d1 * nu + nc * in_x(setting.n1_squared) * mirrored(d2) * E_denominator
@@ -62,6 +72,8 @@ def _block(setting: Setting, problem: Problem, T: arb_poly, S: arb_poly) -> Bloc
     """K = T/(S G) d_2/d_1 in rad/s."""
     G, x = problem.G, setting.line
     _, d1, d2 = shared(problem.W1.poles, problem.W2.poles)
+    images, _, d1 = reflected(G.poles, d1, x.decay_rate)  # E is zero at such a pole of G, and T at its image
+    T //= x.polynomial(images)
     d2 = [root if root.real < -x.decay_rate else complex(-2 * x.decay_rate - root.real, root.imag) for root in d2]
     zeros, poles = ([root for root in roots if root.real <= -x.decay_rate] for roots in (G.zeros, G.poles))
     own_zeros, own_poles = ([x.back(root) for root in polynomial_roots(factor)] for factor in (T, S))

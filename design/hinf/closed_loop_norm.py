@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from flint import arb
 
-from design.blocks.ball import UndecidedError, decided, line, polynomial_roots, shared, squared
+from design.blocks.ball import UndecidedError, decided, line, polynomial_roots, reflected, shared, squared
 from design.blocks.block import Block
 from identification.base.errors import InputError
 
@@ -36,12 +36,13 @@ def closed_loop_norm(G: Block, W1: Block, W2: Block, K: Block, decay_rate: float
     """
     L = G * K
     first, second = W1 * Block(1.0, L.poles), W2 * Block(1.0, L.zeros)  # W1 S, W2 T without characteristic and gain
-    common, own1, own2 = shared(first.poles, second.poles)
+    _, zeros1, poles1 = reflected(first.zeros, first.poles, decay_rate)
+    common, own1, own2 = shared(poles1, second.poles)
 
     def bound() -> float:
         x = line(decay_rate, G, W1, W2, K)
         characteristic = x.polynomial(L.poles) + x.gain(L) * x.polynomial(L.zeros)
-        numerator = squared(x.gain(W1) * x.polynomial((*first.zeros, *own2)))
+        numerator = squared(x.gain(W1) * x.polynomial((*zeros1, *own2)))
         numerator += squared(x.gain(W2) * x.gain(L) * x.polynomial((*second.zeros, *own1)))
         denominator = squared(x.polynomial((*common, *own1, *own2)) * characteristic)
         if numerator.degree() > denominator.degree():

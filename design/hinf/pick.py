@@ -14,7 +14,9 @@ from design.blocks.ball import (
     Line,
     decided,
     from_roots,
+    in_x,
     line,
+    mirrored,
     negative_pivot,
     number,
     polynomial_roots,
@@ -59,8 +61,10 @@ class Problem:
         E = n_c n_2 n_2~ d_1~/(d_2 nu) at the poles,   E = -n_c n_1 n_1~ d_2~/(d_1 nu) at the zeros and the roots.
 
     By Pick's theorem there is one if and only if the matrix (1 - e_k conj(e_l))/(s_k + conj(s_l)) of the points s_k
-    and values e_k is not indefinite (J. B. Garnett, Bounded Analytic Functions, Academic Press 1981, chapter I). Below
-    a gamma at which nu nu~ is negative somewhere on the axis there is none whatever the plant.
+    and values e_k is not indefinite (J. B. Garnett, Bounded Analytic Functions, Academic Press 1981, chapter I). At a
+    multiple pole or zero of G as many Taylor coefficients of E are known, and the matrix holds those of
+    (1 - E(s) conj(E(t)))/(s + conj(t)) in s and conj(t). Below a gamma at which nu nu~ is negative somewhere on the
+    axis there is none whatever the plant.
     """
 
     G: Block
@@ -87,7 +91,7 @@ class Setting:
 
     @property
     def points(self) -> tuple[acb, ...]:
-        """All points of the right half plane where E is known."""
+        """All points of the right half plane where E is known, each as often in a row as it is multiple."""
         return self.poles + self.zeros + self.roots
 
 
@@ -101,10 +105,17 @@ def setting_of(problem: Problem, bits: int) -> Setting:
     n2_squared = x.gain(problem.W2) ** 2 * squared(x.hurwitz(n2))
     N = n1_squared * squared(x.hurwitz(d2)) + n2_squared * squared(x.hurwitz(d1))
     poles, zeros = (
-        tuple(both for root in x.points(roots) if root.real > 0 for both in _pair(root))
+        tuple(
+            each
+            for root in dict.fromkeys(roots)
+            for point in x.points([root])
+            if point.real > 0
+            for both in _pair(point)
+            for each in [both] * roots.count(root)
+        )
         for roots in (problem.G.poles, problem.G.zeros)
     )
-    roots = tuple(right_half_plane_roots(N))
+    roots = tuple(right_half_plane_roots(polynomial_roots(N)))
     return Setting(
         x,
         x.hurwitz(d1),
@@ -145,11 +156,12 @@ def is_feasible(problem: Problem, gamma: float) -> Obstacle | bool:
 
 def _judge(setting: Setting, problem: Problem, gamma: float) -> Obstacle | bool:
     level = level_of(setting, gamma)
-    obstacle = _single_point(setting, problem, gamma, level)
+    squares = polynomial_roots(level)
+    obstacle = _single_point(setting, problem, gamma, level, squares)
     if obstacle is not None:
         return obstacle
     points = setting.points
-    pivot = negative_pivot(pick_matrix(points, values_of(setting, nu_of(level))))
+    pivot = negative_pivot(pick_matrix(points, values_of(setting, nu_of(level, squares))))
     if pivot is None:
         return True
     return Obstacle(
@@ -158,13 +170,15 @@ def _judge(setting: Setting, problem: Problem, gamma: float) -> Obstacle | bool:
     )
 
 
-def _single_point(setting: Setting, problem: Problem, gamma: float, level: arb_poly) -> Obstacle | None:
+def _single_point(
+    setting: Setting, problem: Problem, gamma: float, level: arb_poly, squares: Sequence[acb]
+) -> Obstacle | None:
     """What S and T cost at one point of the closed half plane, where that is more than gamma."""
     top = level.degree()
     if (-1) ** top * level[top] < 0:
         constant = level_of(setting, 0.0)[top] / (level - level_of(setting, 0.0))[top] * -(arb(gamma) ** 2)
         return _costs(constant.sqrt(), "S + T = 1 at infinite frequency")
-    crossings = sorted(float((-root.real).sqrt()) for root in polynomial_roots(level) if root.imag == 0 > root.real)
+    crossings = sorted(float((-root.real).sqrt()) for root in squares if root.imag == 0 > root.real)
     if crossings:  # simple roots: the level is negative between two of them, or before the first
         omegas = [
             setting.line.unit * omega
@@ -209,27 +223,52 @@ def _modulus(weight: Block, s: complex) -> arb:
     return abs(value)
 
 
-def nu_of(level: arb_poly) -> arb_poly:
-    """The polynomial nu without roots in the right half plane."""
-    roots = [acb(-root.real, root.imag) for root in right_half_plane_roots(level) if not root.imag < 0]
+def nu_of(level: arb_poly, squares: Sequence[acb]) -> arb_poly:
+    """The polynomial nu without roots in the right half plane; ``squares`` are the roots of the level."""
+    roots = [acb(-root.real, root.imag) for root in right_half_plane_roots(squares) if not root.imag < 0]
     return abs(level[level.degree()]).sqrt() * from_roots(roots)
 
 
 def values_of(setting: Setting, nu: arb_poly) -> list[acb]:
-    """E at the points."""
-    values = []
-    for k, s in enumerate(setting.points):
-        if k < len(setting.poles):
-            own, other, squares = setting.d2, setting.d1, setting.n2_squared
-        else:
-            own, other, squares = setting.d1, setting.d2, -setting.n1_squared
-        values.append(setting.nc(s) * squares(s * s) * other(-s) / (own(s) * nu(s)))
+    """E at the points; where a point is repeated, its next Taylor coefficients."""
+    d1, d2, nc = setting.d1, setting.d2, setting.nc
+    at_poles = nc * in_x(setting.n2_squared) * mirrored(d1), d2 * nu
+    elsewhere = -nc * in_x(setting.n1_squared) * mirrored(d2), d1 * nu
+    values: list[acb] = []
+    for k, (s, order) in enumerate(zip(setting.points, orders_of(setting.points), strict=True)):
+        above, below = at_poles if k < len(setting.poles) else elsewhere
+        known = sum((values[k - i] * _coefficient(below, s, i) for i in range(1, order + 1)), acb(0))
+        values.append((_coefficient(above, s, order) - known) / below(s))
     return values
 
 
+def _coefficient(polynomial: arb_poly, s: acb, order: int) -> acb:
+    """Of (x - s)^order."""
+    for _ in range(order):
+        polynomial = polynomial.derivative()
+    return polynomial(s) / math.factorial(order)
+
+
+def orders_of(points: Sequence[acb]) -> list[int]:
+    """How many equal ones stand directly before each point."""
+    orders: list[int] = []
+    for k, s in enumerate(points):
+        orders.append(orders[-1] + 1 if k and s == points[k - 1] else 0)
+    return orders
+
+
 def pick_matrix(points: Sequence[acb], values: Sequence[acb]) -> list[list[acb]]:
-    """(1 - e_k conj(e_l))/(s_k + conj(s_l)), shape (n, n), of points and values (n,)."""
-    return [
-        [(1 - e * f.conjugate()) / (s + t.conjugate()) for t, f in zip(points, values, strict=True)]
-        for s, e in zip(points, values, strict=True)
-    ]
+    """Pick's matrix, shape (n, n), of points and values (n,), see :class:`Problem`."""
+    conditions = list(zip(points, values, orders_of(points), strict=True))
+    rows: list[list[acb]] = []  # up to the diagonal: the matrix is Hermitian
+    for k, (s, e, order) in enumerate(conditions):
+        row: list[acb] = []
+        for t, f, other in conditions[: k + 1]:
+            entry = (0 if order or other else 1) - e * f.conjugate()
+            if order:
+                entry -= rows[k - 1][len(row)] if len(row) < k else row[-1].conjugate()
+            if other:
+                entry -= row[-1]
+            row.append(entry / (s + t.conjugate()))
+        rows.append(row)
+    return [row + [below[k].conjugate() for below in rows[k + 1 :]] for k, row in enumerate(rows)]

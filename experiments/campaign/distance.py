@@ -25,12 +25,14 @@ def response(factors: Factors, omega: float) -> complex:
     """gain exp(-delay s)/s^integrators times every factor, at s = j omega.
 
     ``factors`` is (gain, delay in s, integrators, modes (m, 3), rates (r, 2)): a mode is omega, zeta, and 1 for a zero
-    or -1 for a pole; a rate is a of 1 + s/a and the same sign.
+    or -1 for a pole; a rate is a of 1 + s/a and the same sign. Integrators below 0 are zeros at s = 0.
     """
     gain, delay, integrators, modes, rates = factors
     value = complex(gain * np.cos(delay * omega), -gain * np.sin(delay * omega))
     for _ in range(integrators):
         value = complex(value.imag / omega, -value.real / omega)
+    for _ in range(-integrators):
+        value = complex(-value.imag * omega, value.real * omega)
     for k in range(len(modes)):
         a = omega / modes[k, 0]
         factor = complex(1.0 - a * a, 2.0 * modes[k, 1] * a)
@@ -43,25 +45,46 @@ def response(factors: Factors, omega: float) -> complex:
 
 @njit(nogil=True, error_model="numpy")
 def moved(nominal: Factors, changes: Changes, t: float) -> Factors:
-    """The factors with t times the changes (log gain, delay, log omega and log zeta (m, 2), log rates (r,))."""
+    """The factors with t times the changes (log gain, delay, log omega and log zeta (m, 2), log rates (r,)).
+
+    With two integrators the last zero and the last pole, which cancel at first, make the slope of the rest at s = 0
+    what it was, since no bound covers another.
+    """
     gain, delay, integrators, modes, rates = nominal
     log_gain, later, log_modes, log_rates = changes
     modes, rates = modes.copy(), rates.copy()
     modes[:, :2] *= np.exp(t * log_modes)
     rates[:, 0] *= np.exp(t * log_rates)
-    return gain * np.exp(t * log_gain), max(delay + t * later, 0.0), integrators, modes, rates
+    true = gain * np.exp(t * log_gain), max(delay + t * later, 0.0), integrators, modes, rates
+    if integrators == 2:
+        apart = np.arcsinh(rates[-1, 0] * (slope(nominal) - slope(true)) / 2)
+        rates[-2, 0] *= np.exp(-apart)
+        rates[-1, 0] *= np.exp(apart)
+    return true
 
 
 @njit(nogil=True, error_model="numpy")
-def _slope(factors: Factors) -> float:
+def slope(factors: Factors) -> float:
     """d/ds of the logarithm of all but gain and integrators, at s = 0."""
     _, delay, _, modes, rates = factors
-    slope = -delay
+    total = -delay
     for k in range(len(modes)):
-        slope += modes[k, 2] * 2.0 * modes[k, 1] / modes[k, 0]
+        total += modes[k, 2] * 2.0 * modes[k, 1] / modes[k, 0]
     for k in range(len(rates)):
-        slope += rates[k, 1] / rates[k, 0]
-    return slope
+        total += rates[k, 1] / rates[k, 0]
+    return total
+
+
+@njit(nogil=True, error_model="numpy")
+def _bend(factors: Factors) -> float:
+    """The second derivative of that logarithm at s = 0."""
+    _, _, _, modes, rates = factors
+    total = 0.0
+    for k in range(len(modes)):
+        total += modes[k, 2] * (2.0 - 4.0 * modes[k, 1] ** 2) / modes[k, 0] ** 2
+    for k in range(len(rates)):
+        total -= rates[k, 1] / rates[k, 0] ** 2
+    return total
 
 
 @njit(nogil=True, error_model="numpy")
@@ -81,15 +104,20 @@ def leading(factors: Factors) -> tuple[float, int]:
 def at_the_ends(true: Factors, nominal: Factors, bound: Factors) -> float:
     """The larger of the limits of |P_true - P|/|W_a| as omega -> 0 and, the upper one, as omega -> infinity.
 
-    At most one integrator. As omega grows the dead times' difference turns P_true against P again and again, so that
-    the upper limit is that of (|P_true| + |P|)/|W_a| as soon as they are not equal.
+    With two integrators the slopes of the rest at s = 0 are taken as equal. As omega grows the dead times' difference
+    turns P_true against P again and again, so that the upper limit is that of (|P_true| + |P|)/|W_a| as soon as they
+    are not equal.
     """
-    if nominal[2] == 0:
+    if nominal[2] < 0:
+        low = 0.0
+    elif nominal[2] == 0:
         low = abs(true[0] - nominal[0])
-    elif true[0] == nominal[0]:
-        low = abs(nominal[0] * (_slope(true) - _slope(nominal)))
-    else:
+    elif true[0] != nominal[0]:
         low = np.inf
+    elif nominal[2] == 1:
+        low = abs(nominal[0] * (slope(true) - slope(nominal)))
+    else:
+        low = abs(nominal[0] * (_bend(true) - _bend(nominal))) / 2
     k_true, degree = leading(true)
     k, _ = leading(nominal)
     w, degree_of_bound = leading(bound)
@@ -142,7 +170,8 @@ def distance(
     true, nominal, bound
         P_true, P and W_a, see :func:`response`; the first two have as many factors.
     omega
-        Shape (n,), increasing, in rad/s: a grid that resolves P and W_a and reaches far beyond them.
+        Shape (n,), increasing, in rad/s: a grid that resolves P and W_a and reaches far beyond them, down to where the
+        rounding of P begins to show beside W_a.
     at_nominal, at_bound
         Shape (n,): P and |W_a| on it.
 
@@ -167,10 +196,10 @@ def distance(
     worst = _refined(true, nominal, bound, omega, values, worst)
     modes = true[3]
     for k in range(len(modes)):
-        points = modes[k, 0] * np.exp(min(modes[k, 1], 0.1) * AROUND)
+        points = modes[k, 0] * np.exp(min(abs(modes[k, 1]), 0.1) * AROUND)
         near = np.empty(len(points))
         for i in range(len(points)):
-            near[i] = _ratio(true, nominal, bound, points[i])
+            near[i] = _ratio(true, nominal, bound, points[i]) if points[i] >= omega[0] else 0.0
         worst = max(worst, near.max())
         worst = _refined(true, nominal, bound, points, near, worst)
     return worst

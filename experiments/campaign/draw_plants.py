@@ -16,11 +16,14 @@ from identification.model.plant import PlantModel
 
 LARGEST = np.log(2.0)  # of a parameter's change in logarithms, however loose the bound
 SHORTEST = 0.05  # of its unit, below which a dead time of 0 stays 0; of itself, to which another one shrinks at most
+FASTER = 4.0  # than the corner of the gain's change, the one at which the slope at s = 0 is made up for
 SMALLEST = 1e-9  # of the largest change, below which none is within the bound
 FINER = 3  # points of the check for one of the search
 AROUND = np.sort(np.concatenate([[0.0], *(sign * np.geomspace(7e-3, 7e2, 61) for sign in (-1, 1))]))  # half widths
 SHRINK, MOST_SHRINK = 1e-6, 1e-2  # of the way, given up in turn until the plant is proved to be within
 ABOVE, LEAST_ABOVE = 1e-3, 1e-6  # how far the distance may lie above the largest ratio found: a share, and in any case
+ABOVE_OF_TWO = 1e-2  # the share with two integrators, of which rounding leaves less to see next to s = 0
+ROUNDINGS = 64  # of a plant's response, in units of its last digit
 TRIES = 500
 
 
@@ -31,10 +34,12 @@ class Member:
     Parameters
     ----------
     plant
-        P_true; around a plant with an integrator it has a real zero and a real pole more than P.
+        P_true; around a plant with integrators it has a real zero and a real pole more than P for each of them.
     distance
         The largest |P_true - P|/|W_a| that was found. Over all frequencies it is proved to be at most 1, and higher by
-        no more than ABOVE of itself and LEAST_ABOVE.
+        no more than ABOVE of itself and LEAST_ABOVE. Around two integrators the share is ABOVE_OF_TWO, and the proof
+        is of a P_true whose slope at s = 0 is that of P. Rounded to doubles it misses that by some 1e-16 of itself,
+        which the ratio shows only at frequencies so much nearer to 0.
     """
 
     plant: PlantModel
@@ -47,22 +52,23 @@ class PlantsWithin:
     Parameters
     ----------
     plant
-        P: any number of modes and real roots, no integrator or one, any dead time.
+        P: any plant of its class.
     bound
         W_a.
 
     Raises
     ------
     InputError
-        No plant but P itself is within the bound: P has two integrators, where a change of any mode already has a pole
-        at s = 0, or W_a falls faster than P.
+        No plant but P itself is within the bound: W_a falls faster than P.
 
     Notes
     -----
-    What is perturbed: the logarithm of omega and zeta of every mode, of every real root's rate, of the gain, and the
-    dead time. With an integrator (K' - K)/s has a pole at s = 0 and no W_a that is finite there covers another K. The
-    gain is then perturbed away from s = 0: by g above a corner c, with (1 + s/z)/(1 + s/p), z = c/sqrt(g),
-    p = c sqrt(g), and c at random between the slowest and the fastest of the plant's roots.
+    What is perturbed: the logarithm of the size of omega and zeta of every mode, of every real root's rate, of the
+    gain, and the dead time; every root stays in its half plane. With an integrator (K' - K)/s has a pole at s = 0 and
+    no W_a that is finite there covers another K. The gain is then perturbed away from s = 0: by g above a corner c,
+    with (1 + s/z)/(1 + s/p), z = c/sqrt(g), p = c sqrt(g), and c at random between the slowest and the fastest of the
+    plant's roots. With two integrators the slope of the rest at s = 0 may not change either: another zero z and pole p,
+    with sqrt(z p) = FASTER c and 1/z - 1/p equal to what that slope lacks, take every change of it back.
 
     How these weigh against each other is a choice of ours that has no number in it: the unit of each is the change
     that alone, upwards, brings P to the boundary of W_a (at most a factor of 2; of the dead time at most itself or
@@ -77,19 +83,14 @@ class PlantsWithin:
     """
 
     def __init__(self, plant: PlantModel, bound: AdditiveBound) -> None:
-        if plant.integrators > 1:
-            raise InputError(
-                f"the plant has {plant.integrators} integrators; expected at most one, as any other mode or dead time "
-                "then differs by a pole at s = 0, which no additive bound covers"
-            )
         self.plant, self.bound = plant, bound
         modes, zeros_and_poles = _modes(plant), [*plant.real_zeros, *plant.real_poles]
-        omegas = [*(mode.omega for mode, _ in modes), *zeros_and_poles] or [bound.corner]
+        omegas = [*(mode.omega for mode, _ in modes), *map(abs, zeros_and_poles)] or [bound.corner]
         self._corners = np.log([min(omegas), max(omegas)])
         self._bound = as_factors(bound)
         roots = [root for mode, _ in modes + _modes(bound) for root in mode.roots]
         roots += [complex(-rate) for rate, _ in [*_rates(plant), *_rates(bound)]]
-        self._grid = frequency_grid(roots)
+        self._grid = self._resolved(frequency_grid(roots))
         ratio = self._grid[1:] / self._grid[:-1]
         finer = [self._grid[:-1] * ratio ** (k / FINER) for k in range(1, FINER)]
         self._check = np.sort(np.concatenate([self._grid, *finer]))
@@ -135,7 +136,7 @@ class PlantsWithin:
         share
             In (0, 1].
         corner
-            Of the gain's change in rad/s, where the plant has an integrator.
+            Of the gain's change in rad/s, where the plant has integrators.
         """
         with np.errstate(divide="ignore"):
             most = np.min(self._most / np.abs(direction))
@@ -145,7 +146,7 @@ class PlantsWithin:
         if self.plant.delay_s == 0 and t * direction[-1] < SHORTEST * self._units[-1]:
             direction = np.append(direction[:-1], 0.0)
         nominal, changes = self._problem(corner, direction)
-        shrink = SHRINK
+        shrink, above = SHRINK, ABOVE_OF_TWO if self.plant.integrators == 2 else ABOVE
         for _ in range(TRIES if t > 0 else 0):
             true = moved(nominal, changes, t)
             plant = self._as_plant(true)
@@ -154,25 +155,33 @@ class PlantsWithin:
                 at_the_ends(true, nominal, self._bound),
                 self._checked(plant),
             )
-            if found <= 1 and stays_below(true, nominal, self._bound, min(found * (1 + ABOVE) + LEAST_ABOVE, 1.0)):
+            if found <= 1 and stays_below(true, nominal, self._bound, min(found * (1 + above) + LEAST_ABOVE, 1.0)):
                 return Member(plant, float(found))
             t *= 1 - shrink
             shrink = min(10 * shrink, MOST_SHRINK)
         raise InputError("no plant within the additive bound was found along a direction; expected a larger bound")
+
+    def _resolved(self, omega: np.ndarray) -> np.ndarray:
+        """The frequencies but those, next to s = 0, at which the rounding of P alone would show beside W_a."""
+        lost = ROUNDINGS * np.finfo(float).eps * np.abs(self.plant(1j * omega) / self.bound(1j * omega)) > LEAST_ABOVE
+        return omega[int(np.argmin(lost)) :]
 
     def _reach(self, log_corner: float, direction: np.ndarray, most: float) -> float:
         nominal, changes = self._problem(np.exp(log_corner), direction)
         return float(reach(nominal, changes, float(most), self._bound, self._grid, *self._on_grid))
 
     def _problem(self, corner: float, direction: np.ndarray) -> tuple[Factors, Changes]:
-        """P as factors, with a real zero and a real pole that cancel where it has an integrator, and their changes."""
+        """P as factors, with a real zero and a real pole that cancel for each integrator, and their changes."""
         plant = self.plant
         modes, rates = _modes(plant), _rates(plant)
         split = 2 * len(modes)
         log_rates, (log_gain, later) = direction[split:-2], direction[-2:]
-        if plant.integrators:
-            rates = [*rates, (corner, 1.0), (corner, -1.0)]
+        if plant.integrators > 0:
+            rates += [(corner, 1.0), (corner, -1.0)]
             log_rates, log_gain = np.append(log_rates, [-log_gain / 2, log_gain / 2]), 0.0
+        if plant.integrators == 2:
+            rates += [(FASTER * corner, 1.0), (FASTER * corner, -1.0)]
+            log_rates = np.append(log_rates, [0.0, 0.0])
         nominal = _factors(plant.gain, plant.delay_s, plant.integrators, modes, rates)
         return nominal, (float(log_gain), float(later), direction[:split].reshape(-1, 2).copy(), log_rates.copy())
 
@@ -185,11 +194,12 @@ class PlantsWithin:
     def _checked(self, true: PlantModel) -> float:
         """The largest |P_true - P|/|W_a| on another, finer grid, by the plants themselves: a check of their factors."""
         modes = [mode for mode, _ in _modes(true)]
-        omega = np.concatenate([mode.omega * np.exp(min(mode.zeta, 0.02) * AROUND) for mode in modes] or [np.zeros(0)])
+        around = [mode.omega * np.exp(min(abs(mode.zeta), 0.02) * AROUND) for mode in modes]
+        omega = np.concatenate([np.zeros(0), *around])
         worst = np.max(np.abs(true(1j * self._check) - self._on_check[0]) / self._on_check[1])
-        if not len(omega):
+        s = 1j * omega[omega >= self._grid[0]]
+        if not len(s):
             return float(worst)
-        s = 1j * omega
         return float(max(worst, np.max(np.abs(true(s) - self.plant(s)) / np.abs(self.bound(s)))))
 
 

@@ -42,12 +42,13 @@ class PerturbedLoop:
 
         1 + P_true C = (1 + P C) (1 + D C S),    S = 1/(1 + P C).
 
-    C S is stable, since the nominal loop is. D is stable too: the modes of both plants are damped, and K/s is the same
-    in both, so that D has no pole at s = 0. D C S therefore has no pole in the closed right half plane, and it
-    vanishes as s grows there: P and P_true are strictly proper, S tends to 1, C is proper. By the argument principle
-    the loop with P_true has as many roots in the open right half plane as f(j omega) = 1 + D C S turns about 0
-    clockwise while omega grows from -infinity to infinity: as the turns of its phase in units of -pi from 0 on, f
-    being real there. Where |D C S| < 1 everywhere there is no turn, whatever else: that is the guarantee of W_a.
+    C S is stable, since the nominal loop is. It vanishes at s = 0 as s^q does, K/s^q being the same in both plants, so
+    that D C S has no pole there. As s grows in the right half plane it vanishes, since P C and P_true C do and S tends
+    to 1. By the argument principle f(j omega) = 1 + D C S turns about 0 clockwise, while omega grows from -infinity to
+    infinity, as often as f has zeros there more than poles: these zeros are the roots of the loop with P_true and the
+    unstable poles of P, the poles those of P_true, which are as many. So the roots are the turns of its phase in units
+    of -pi from 0 on, f being real there. Where |D C S| < 1 everywhere there is no turn, whatever else: that is the
+    guarantee of W_a.
 
     It is the loop from the reference to output and control that is judged. What the controller hides in itself is
     the design's, and no true plant moves it.
@@ -82,12 +83,13 @@ class PerturbedLoop:
         Parameters
         ----------
         true
-            P_true, with as many integrators as the model and the same gain if there are any.
+            P_true, with as many integrators and as many poles in the right half plane as the model, and the same gain
+            if there are integrators.
 
         Raises
         ------
         InputError
-            The plant differs in its integrators, or a root lies on the imaginary axis as far as can be seen.
+            The plant is not as above, or a root lies on the imaginary axis as far as can be seen.
 
         Notes
         -----
@@ -97,14 +99,17 @@ class PerturbedLoop:
         not proved: a turn that begins and ends between two points would be missed. Where |D C S| < 1 at all
         frequencies the number is 0 without it.
         """
-        if (true.integrators, true.gain if true.integrators else 0.0) != (
-            self.plant.integrators,
-            self.plant.gain if self.plant.integrators else 0.0,
-        ):
+        same_gain = true.integrators <= 0 or true.gain == self.plant.gain
+        if true.integrators != self.plant.integrators or not same_gain:
             raise InputError("the true plant's integrators differ from the model's; expected the same, gain and all")
+        if len(true.unstable_poles) != len(self.plant.unstable_poles):
+            raise InputError(
+                f"the true plant has {len(true.unstable_poles)} poles in the right half plane, the model "
+                f"{len(self.plant.unstable_poles)}; expected as many"
+            )
         modes = [*true.zero_modes, *true.pole_modes]
-        near = np.concatenate([mode.omega * np.exp(min(mode.zeta, 0.1) * AROUND) for mode in modes] or [np.zeros(0)])
-        near = np.concatenate([near, self._further(true)])
+        around = [mode.omega * np.exp(min(abs(mode.zeta), 0.1) * AROUND) for mode in modes]
+        near = np.concatenate([*around, self._further(true)])
         omega = np.concatenate([self._omega, near])
         plant, control = self._on_grid
         known = (true(1j * self._omega) - plant) * control

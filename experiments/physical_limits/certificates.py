@@ -53,7 +53,9 @@ def forced(cells: Cells, mu: np.ndarray, r: Samples, gain: float) -> float:
         The plant.
     mu
         Any weights, of the shape of ``r.values`` and a sum of sizes near 1, from :func:`whole`: of sum 0 where an
-        offset of y counts for nothing, that is where an integrator does not start from rest.
+        offset of y counts for nothing, that is where an integrator does not start from rest. Where y may jump they are
+        those of its means in the cells, see :meth:`experiments.physical_limits.response_cells.Cells.costates`; no cell
+        begins at the last time of a start from rest, whose weight is then 0.
     r
         The reference.
     gain
@@ -66,7 +68,8 @@ def forced(cells: Cells, mu: np.ndarray, r: Samples, gain: float) -> float:
         |mu| max |r - y| >= sum mu_k (r - y)(t_k) >= sum mu_k r(t_k) - gain integral |h - m| dt - sum |q_k| |x_k|
                             - |p_0 x_0|,
 
-    m any number where u has the mean zero, else 0; the last term is 0 where x starts from rest or is periodic.
+    m any number where u has the mean zero, else 0; the last term is 0 where x starts from rest or is periodic. Of
+    means, h has mu_k (d + the integral of c exp(A s) b up to t_{k+1} - t) beside.
     Within a cell h differs from its chord by at most 1/8 of its largest second derivative, in the mean by two thirds
     of that. Where it therefore keeps its sign its integral is known; elsewhere its chord's is, and the rest is added.
     """
@@ -75,22 +78,31 @@ def forced(cells: Cells, mu: np.ndarray, r: Samples, gain: float) -> float:
     stray = float(cells.costate_defects(mu, p) @ x)
     if cells.start == "ever":
         stray += float(np.abs(p[0, : cells.stable]) @ x[: cells.stable])
-    p, weight = p[1:], np.abs(p[1:])
-    left, right, area = (p @ vector for vector in (chain.impulse[0, 1], chain.impulse[0, 0], chain.pulse))
-    size_A, most_b = np.abs(chain.A), cells.within @ np.abs(chain.b)
+    p, size_A, impulse, pulse = p[1:], np.abs(chain.A), chain.impulse, chain.pulse
+    most_b, values, doubt = cells.within @ np.abs(chain.b), r.values, r.doubt
+    if cells.jumps:
+        n = len(chain.b)
+        p = np.column_stack([p, mu[: len(p)]])
+        impulse = np.concatenate([impulse, chain.output[:, :, n:]], axis=2)
+        pulse = np.append(pulse, chain.mean[n])
+        size_A = np.block([[size_A, np.zeros((n, 1))], [np.abs(chain.c), np.zeros((1, 1))]])
+        most_b = np.append(most_b, abs(chain.d) + np.abs(chain.c) @ most_b)
+        values, doubt = (values + np.roll(values, -1)) / 2, doubt + r.bulge + UNIT
+    weight = np.abs(p)
+    left, right, area = (p @ vector for vector in (impulse[0, 1], impulse[0, 0], pulse))
     powers = [np.linalg.matrix_power(size_A, power) @ most_b for power in (0, 2, 4, 8)]
-    off = (len(chain.b) + 8) * UNIT * (weight @ np.max(powers[:3], axis=0)) * SPARE
-    second, fourth = (np.maximum(*np.abs(chain.impulse[power] @ p.T)) for power in (2, 4))
-    sixth = weight @ (np.abs(chain.impulse[6]).max(axis=0) + powers[3] / 8)
+    off = (len(most_b) + 8) * UNIT * (weight @ np.max(powers[:3], axis=0)) * SPARE
+    second, fourth = (np.maximum(*np.abs(impulse[power] @ p.T)) for power in (2, 4))
+    sixth = weight @ (np.abs(impulse[6]).max(axis=0) + powers[3] / 8)
     bend = (second + (fourth + sixth / 8) / 8) / 8 * SPARE + off
-    if cells.start == "periodic" and cells.plant.integrators:
+    if cells.start == "periodic" and cells.plant.integrators > 0:
         middle = float(np.median(right))
         left, right, area = left - middle, right - middle, area - middle
         off = off + UNIT * (abs(middle) + np.abs(left) + np.abs(right) + np.abs(area))
     keeps = (left * right > 0) & (np.minimum(np.abs(left), np.abs(right)) > bend + off)
     most = np.where(keeps, np.abs(area), absolute_integral(left, right) + 2 / 3 * bend) + off
     taken = gain * (float(most.sum()) * (1 + len(most) * UNIT) + stray) * (1 + 8 * UNIT)
-    had = float(mu @ r.values) - len(mu) * UNIT * float(np.abs(mu) @ np.abs(r.values)) - r.doubt * size
+    had = float(mu @ values) - len(mu) * UNIT * float(np.abs(mu) @ np.abs(values)) - doubt * size
     return (had - taken) / size - 4 * UNIT
 
 
@@ -119,7 +131,7 @@ def reached(cells: Cells, u: np.ndarray, r: Samples, gain: float, counted: slice
     n = len(chain.b)
     flow = np.zeros((n + 1, n + 1))
     flow[:n, :n], flow[:n, n] = np.abs(chain.A), np.abs(chain.b)
-    most_c = np.abs(np.append(chain.c, 0.0)) @ positive_exponential(flow * SPARE)
+    most_c = np.abs(np.append(chain.c, chain.d)) @ positive_exponential(flow * SPARE)
     stray = float(most_c[:n] @ cells.reach(cells.state_defects(u, x))) * SPARE
     z = np.column_stack([x[:-1], u])[counted]
     powers = [most_c @ np.linalg.matrix_power(flow, power) for power in (0, 2, 4, 8)]
@@ -130,7 +142,7 @@ def reached(cells: Cells, u: np.ndarray, r: Samples, gain: float, counted: slice
     values = np.append(r.values, r.values[0]) if cells.start == "periodic" else r.values
     left = values[:-1][counted] - gain * (z @ chain.output[0, 0])
     right = values[1:][counted] - gain * (z @ chain.output[0, 1])
-    if cells.start == "periodic" and cells.plant.integrators:
+    if cells.start == "periodic" and cells.plant.integrators > 0:
         middle = (max(left.max(), right.max()) + min(left.min(), right.min())) / 2
         left, right = left - middle, right - middle
     inside = np.maximum(np.abs(left), np.abs(right)) + gain * (bend + off + stray)

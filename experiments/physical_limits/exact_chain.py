@@ -21,15 +21,15 @@ Row = list[Fraction]
 
 @dataclass(frozen=True)
 class Chain:
-    """x' = A x + b u, y = c x of a plant without its dead time, time counted in cells.
+    """x' = A x + b u, y = c x + d u of a plant without its dead time, time counted in cells.
 
     Every number is the exact one of the plant's own parameters rounded once: it is off by at most 2^-53 of itself
     and :data:`TINY`.
 
     Parameters
     ----------
-    A, b, c
-        Shapes (n, n), (n,), (n,). The poles at zero come last, and what drives a state comes before it.
+    A, b, c, d
+        Shapes (n, n), (n,), (n,), (). The poles at zero come last, and what drives a state comes before it.
     flow
         exp(A), shape (n, n).
     impulse
@@ -37,25 +37,29 @@ class Chain:
     pulse
         The integral of exp(A t) b over a cell, shape (n,).
     output
-        ``output[p, end]`` = (c, 0) M^p exp(M end), M the matrix of (x, u) with u' = 0; shape (8, 2, n + 1).
+        ``output[p, end]`` = (c, d) M^p exp(M end), M the matrix of (x, u) with u' = 0; shape (8, 2, n + 1).
+    mean
+        The integral of y over a cell at whose beginning (x, u) is 1, entry by entry; shape (n + 1,).
     """
 
     A: np.ndarray
     b: np.ndarray
     c: np.ndarray
+    d: float
     flow: np.ndarray
     impulse: np.ndarray
     pulse: np.ndarray
     output: np.ndarray
+    mean: np.ndarray
 
 
 def chain(plant: PlantModel, cell_s: Fraction, count: int) -> Chain:
-    """Realise a strictly proper plant as a chain 1/d_1 -> 1/d_2 -> ..., its dead time left out.
+    """Realise a plant as a chain 1/d_1 -> 1/d_2 -> ..., its dead time left out.
 
     Parameters
     ----------
     plant
-        Strictly proper.
+        With a pole.
     cell_s
         Length of a cell in seconds.
     count
@@ -70,32 +74,38 @@ def chain(plant: PlantModel, cell_s: Fraction, count: int) -> Chain:
     -----
     The fastest section leads, so that no fast mode is fed through slow ones, which would leave it tiny. With q the
     chain's end, the output is N(d/dt) q, and d/dt of a row r of states is r A as long as r b = 0, which holds up to
-    the plant's own relative degree: so c = q N(A), in fractions without error.
+    the plant's own relative degree: so c = q N(A), in fractions without error. With as many zeros as poles the last
+    of these r b is not 0, and its share of N is d.
     """
     A, b, end = _sections(plant, cell_s)
     row = [Fraction(plant.gain) * cell_s**plant.integrators * (k == end) for k in range(len(b))]
+    d = Fraction(0)
+    for _ in range(-plant.integrators):
+        d, row = _dot(row, b), _times(row, A)
     for rate in plant.real_zeros:
-        row = _sum(row, [x / (Fraction(rate) * cell_s) for x in _times(row, A)])
+        speed = Fraction(rate) * cell_s
+        d, row = _dot(row, b) / speed, _sum(row, [x / speed for x in _times(row, A)])
     for mode in plant.zero_modes:
         omega, first = Fraction(mode.omega) * cell_s, _times(row, A)
         second = [x / omega**2 for x in _times(first, A)]
-        row = _sum(row, [2 * Fraction(mode.zeta) * x / omega for x in first], second)
+        d, row = _dot(first, b) / omega**2, _sum(row, [2 * Fraction(mode.zeta) * x / omega for x in first], second)
     size = _sizes(_floats(A), _floats(b), count)
     n = len(b)
     A = [[A[i][k] * size[k] / size[i] for k in range(n)] for i in range(n)]
     b, c = [b[i] / size[i] for i in range(n)], [row[i] * size[i] for i in range(n)]
-    lead = Fraction(2) ** int(np.frexp(max(abs(float(x)) for x in c))[1])
-    generator = _integers([*([*row, x] for row, x in zip(A, b, strict=True)), [Fraction(0)] * (n + 1)])
+    lead, none = Fraction(2) ** int(np.frexp(max(abs(float(x)) for x in [*c, d]))[1]), Fraction(0)
+    line = [*(x / lead for x in c), d / lead, none]
+    generator = _integers([*([*row, x, none] for row, x in zip(A, b, strict=True)), [none] * (n + 2), line])
     flow = _exponential(generator)
-    starts = [_integers([*b, Fraction(0)]), _integers([x / lead for x in c] + [Fraction(0)])]
+    starts = [_integers([*b, none, none]), _integers(line)]
     impulse, output = [], []
     for ends in zip((starts[0], (flow @ starts[0]) >> BITS), (starts[1], (starts[1] @ flow) >> BITS), strict=True):
-        column, line = ends
+        column, answer = ends
         columns, lines = [], []
         for _ in range(8):
             columns.append(_rounded(column)[:n])
-            lines.append(_rounded(line) * float(lead))
-            column, line = (generator @ column) >> BITS, (line @ generator) >> BITS
+            lines.append(_rounded(answer)[: n + 1] * float(lead))
+            column, answer = (generator @ column) >> BITS, (answer @ generator) >> BITS
         impulse.append(columns)
         output.append(lines)
     exp = _rounded(flow)
@@ -103,10 +113,12 @@ def chain(plant: PlantModel, cell_s: Fraction, count: int) -> Chain:
         _floats(A),
         _floats(b),
         _floats(c),
+        float(d),
         exp[:n, :n],
         np.swapaxes(np.array(impulse), 0, 1),
         exp[:n, n],
         np.swapaxes(np.array(output), 0, 1),
+        exp[n + 1, : n + 1] * float(lead),
     )
 
 
@@ -120,7 +132,7 @@ def _sections(plant: PlantModel, cell_s: Fraction) -> tuple[list[Row], Row, int]
     sections = [*plant.pole_modes, *(Mode(rate, 1.0) for rate in plant.real_poles)]
     real = [False] * len(plant.pole_modes) + [True] * len(plant.real_poles)
     order = sorted(range(len(sections)), key=lambda k: (-sections[k].omega, k))
-    n = 2 * len(plant.pole_modes) + len(plant.real_poles) + plant.integrators
+    n = 2 * len(plant.pole_modes) + len(plant.real_poles) + max(0, plant.integrators)
     A, b, source, at = [[Fraction(0)] * n for _ in range(n)], [Fraction(0)] * n, -1, 0
 
     def driven(entry: int, gain: Fraction) -> None:
@@ -185,6 +197,10 @@ def _times(row: Row, A: Sequence[Row]) -> Row:
     return [
         sum((row[i] * A[i][k] for i in range(len(row)) if row[i] and A[i][k]), Fraction(0)) for k in range(len(row))
     ]
+
+
+def _dot(row: Row, column: Row) -> Fraction:
+    return sum((x * y for x, y in zip(row, column, strict=True)), Fraction(0))
 
 
 def _sum(*rows: Row) -> Row:

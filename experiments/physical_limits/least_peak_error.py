@@ -42,7 +42,7 @@ def periodic_limit(plant: PlantModel, reference: Reference, limit: float) -> Int
     Parameters
     ----------
     plant
-        With at least one pole more than zeros. Its dead time only shifts u.
+        With a pole, and none in the right half plane. Its dead time only shifts u.
     reference
         Periodic: its frequencies, 0 apart, are multiples of the slowest one, whose period u has. What is a multiple to
         1e-9 of itself is taken as one.
@@ -277,8 +277,17 @@ def _row(
 
 def _harmonic(plant: PlantModel, reference: Reference, limit: float) -> Reference:
     """The reference with frequencies that are multiples of the slowest; refuses what :func:`periodic_limit` does."""
-    if plant.relative_degree < 1:
-        raise InputError("the plant has as many zeros as poles; expected more poles, or its output may jump")
+    if plant.unstable_poles:
+        fastest = max(pole.real for pole in plant.unstable_poles)
+        raise InputError(
+            f"the plant has a pole in the right half plane, of real part {fastest:.4g} rad/s; expected none, since no "
+            "bound here holds for states that grow"
+        )
+    if not (plant.pole_modes or plant.real_poles or plant.integrators > 0):
+        raise InputError(
+            f"the plant is the gain {plant.gain:.4g}, whose least error is the largest |r| less {abs(plant.gain):.4g} "
+            "times the limit; expected a plant with a pole"
+        )
     if reference.slope:
         raise InputError(f"the reference has the slope {reference.slope:g} a second; expected a periodic one")
     slowest = min((omega for omega in reference.omegas if omega > 0), default=math.inf)

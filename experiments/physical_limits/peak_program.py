@@ -27,6 +27,7 @@ PHASE = 0.3  # most that the fastest pole turns or decays within a cell, rad
 WIDTHS = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0)  # of the averages that are tried, in steps
 PASSES = 3  # three boxes in a row are a smooth bell
 SPARE = 6  # steps at the end of a start from rest that only serve the averages
+LOST = 1e-3  # of the weights: so many may lie beyond the time to which the error counts
 MOST_CELLS = 2_000_000
 # the first is the fastest, the others seldom fail
 ATTEMPTS: tuple[tuple[Literal["highs-ipm", "highs-ds"], bool], ...] = (
@@ -43,7 +44,7 @@ class PeakProgram:
     Parameters
     ----------
     plant
-        Strictly proper; its dead time is left out.
+        With a pole; its dead time is left out.
     span_s
         The period, or from rest at t = 0 the horizon, in seconds.
     steps
@@ -141,26 +142,29 @@ class PeakProgram:
         keeps its limit and stops exciting resonances between the samples, and the program's dual weights excite the
         plant less. What an average of u reaches, :func:`experiments.physical_limits.certificates.reached` bounds; what
         weights prove, whichever they are, :func:`experiments.physical_limits.certificates.forced`. Several averages are
-        tried and the best bound of each kind kept: every one of them holds, however well the program was solved.
+        tried and the best bound of each kind kept: every one of them holds, however well the program was solved. From
+        rest the error counts in the program beyond the time to which it counts here, so that the averages of u find a
+        u there that goes on; weights that lie beyond prove nothing, and are then those of a second program without.
         """
-        values = reference(self.time_s + ahead_s)
+        values, counted = reference(self.time_s + ahead_s), slice(first, self.counted)
         if self._centred:  # a constant counts for nothing
             values = values - (values.max() + values.min()) / 2
         scale = float(np.abs(values).max()) or 1.0
         doubt = reference.rounding(float(self.span_s) + ahead_s) / scale + 4 * UNIT
         r, gain = Samples(values / scale, doubt, reference.bend * self.cell_s**2 / 8 / scale), limit / scale
-        u, mu = self._optimum(r.values, gain, first)
+        u, mu = self._optimum(r.values, gain, slice(first, len(values)))
+        weighed = slice(first, self.counted - (self._cells.jumps and not self.periodic))
+        if np.abs(mu[weighed.stop :]).sum() > LOST * np.abs(mu).sum():
+            _, mu = self._optimum(r.values, gain, weighed)
         cells, more = self._cells, gain * (1 + 2 * UNIT)
-        counted = slice(first, self.counted)
         controls = (whole(self._average(u, width, first), self._centred) for width in WIDTHS)
         uppers = [reached(cells, control, r, more, counted) for control in controls]
-        lowers = [forced(cells, self._weights(mu, width, first), r, more) for width in WIDTHS] if mu.any() else [0.0]
+        lowers = [forced(cells, self._weights(mu, width, weighed), r, more) for width in WIDTHS] if mu.any() else [0.0]
         return outward(scale * max(0.0, *lowers), scale * min(uppers))
 
-    def _weights(self, mu: np.ndarray, width: float, first: int) -> np.ndarray:
+    def _weights(self, mu: np.ndarray, width: float, counted: slice) -> np.ndarray:
         """Averaged weights for :func:`experiments.physical_limits.certificates.forced`, none at the end of the span."""
-        weights = self._average(mu, width, first)
-        weights[self.counted :] = 0.0
+        weights = self._average(mu, width, 0) if self.periodic else self._spread(mu, width, counted)
         return whole(weights / np.abs(weights).sum(), self._centred)
 
     def _edges(self, first: int) -> np.ndarray:
@@ -172,13 +176,13 @@ class PeakProgram:
         before, after = (steps * self.fineness for steps in NEAR)
         return np.union1d(whole, parts[(parts >= first - before) & (parts <= first + after)])
 
-    def _optimum(self, r: np.ndarray, gain: float, first: int) -> tuple[np.ndarray, np.ndarray]:
+    def _optimum(self, r: np.ndarray, gain: float, counted: slice) -> tuple[np.ndarray, np.ndarray]:
         """Solve the program: u in every cell, as a share of its limit, and the weights of e at the cells' ends.
 
         The variables are the states at the steps' ends (but for the start from rest), u in the steps, the peak.
         """
-        c, n = self._cells.chain.c[None, :], len(self._cells.chain.b)
-        edges = self._edges(first)
+        c, d, n, jumps = self._cells.chain.c[None, :], self._cells.chain.d, len(self._cells.chain.b), self._cells.jumps
+        edges = self._edges(counted.start)
         lengths = np.diff(edges)
         steps = len(lengths)
         ends = steps + (not self.periodic)
@@ -193,17 +197,17 @@ class PeakProgram:
             nothing = sparse.csr_array((n * steps, 1))
             flow = [sparse.kron(these.T @ these @ before, kept), sparse.kron(these.T @ these, driven[:, None])]
             dynamics = dynamics - sparse.hstack([*flow, nothing])
-            for inside in range(0, length, length // SAMPLES):
+            for inside in [length // 2] if jumps else range(0, length, length // SAMPLES):
                 kept, driven = self._over(inside)
-                outputs.append(sparse.hstack([sparse.kron(these @ before, c @ kept), (c @ driven)[0] * these]))
+                outputs.append(sparse.hstack([sparse.kron(these @ before, c @ kept), ((c @ driven)[0] + d) * these]))
                 samples.append(edges[chosen] + inside)
-        if not self.periodic:
+        if not (self.periodic or jumps):
             outputs.append(sparse.hstack([sparse.kron(state[-1:], c), sparse.csr_array((1, steps))]))
             samples.append(edges[-1:])
         sampled = np.concatenate(samples)
-        counted = np.flatnonzero(sampled >= first)
-        output, sampled = gain * sparse.vstack(outputs).tocsr()[counted], sampled[counted]
-        peak = sparse.csr_array(-np.ones((len(counted), 1)))
+        judged = np.flatnonzero((sampled >= counted.start) & (sampled < counted.stop))
+        output, sampled = gain * sparse.vstack(outputs).tocsr()[judged], sampled[judged]
+        peak = sparse.csr_array(-np.ones((len(judged), 1)))
         both: Any = sparse.vstack([sparse.hstack([output, peak]), sparse.hstack([-output, peak])])
         control = slice(output.shape[1] - steps, output.shape[1])
         bounds: Any = np.full((output.shape[1] + 1, 2), [-np.inf, np.inf])
@@ -227,7 +231,7 @@ class PeakProgram:
                 f"reference takes (the solver says: {' '.join(str(solution.message).split())})"
             )
         u, prices = np.clip(np.asarray(solution.x)[control], -1.0, 1.0), np.asarray(solution.ineqlin.marginals)
-        weights = prices[: len(counted)] - prices[len(counted) :]
+        weights = prices[: len(judged)] - prices[len(judged) :]
         if self._centred:
             u, weights = u - u.mean(), weights - weights.mean()
         mu = np.zeros(len(r))
@@ -242,13 +246,27 @@ class PeakProgram:
         return both[:n, :n], both[:n, n]
 
     def _average(self, values: np.ndarray, width: float, first: int) -> np.ndarray:
-        """Repeated moving averages, from ``first`` on, of values in the cells or at their ends.
+        """Repeated moving averages, from ``first`` on, of values in the cells or, if periodic, at their ends.
 
-        Where there is no period to go on with, the values are mirrored at both ends. As a matrix that is symmetric
-        with rows of non-negative shares, sum 1: it averages, keeps the sum, and may be put on mu as well as on e.
+        Where there is no period to go on with, the values are mirrored at both ends.
         """
         half, later = int(width * self.fineness / 2), values[first:]
         for _ in range(PASSES):
             total = np.append(0.0, np.cumsum(np.pad(later, half, mode="wrap" if self.periodic else "symmetric")))
             later = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
         return np.append(values[:first], later)
+
+    def _spread(self, mu: np.ndarray, width: float, counted: slice) -> np.ndarray:
+        """The weights that count, each spread evenly to both sides, again and again, as far as the ends allow.
+
+        That keeps their sum and their mean time, and so the costates of two integrators before them.
+        """
+        weights, later = np.zeros_like(mu), mu[counted]
+        place = np.arange(len(later))
+        half = np.minimum(int(width * self.fineness / 2), np.minimum(place, place[::-1]))
+        for _ in range(PASSES):
+            rises = np.bincount(place - half, later / (2 * half + 1), len(later) + 1)
+            falls = np.bincount(place + half + 1, later / (2 * half + 1), len(later) + 1)
+            later = np.cumsum(rises - falls)[:-1]
+        weights[counted] = later
+        return weights

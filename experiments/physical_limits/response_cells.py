@@ -28,7 +28,7 @@ class Cells:
     Parameters
     ----------
     plant
-        Strictly proper.
+        With a pole.
     cell_s, count
         Length of a cell in seconds, and how many make the span or the period.
     start
@@ -50,7 +50,7 @@ class Cells:
     @property
     def stable(self) -> int:
         """How many states are not integrators; they come first."""
-        return len(self.chain.b) - self.plant.integrators
+        return len(self.chain.b) - max(0, self.plant.integrators)
 
     def states(self, u: np.ndarray) -> np.ndarray:
         """x at the cells' ends, shape (count + 1, n), for u (count,), constant in each cell."""
@@ -61,8 +61,10 @@ class Cells:
 
         mu has the shape (count + 1,), if periodic (count,). Then sum mu_k y(t_k) is the sum of the integrals of
         p_{k+1} exp(A (t_{k+1} - t)) b u(t), time in cells, and of p_0 x_0 where x does not start from rest.
+
+        Where y may jump, mu_k is the weight of y's mean in the cell that begins at t_k, and c what x has in that.
         """
-        weighted = mu[::-1, None] * self.chain.c
+        weighted = mu[::-1, None] * self._seen
         if self.start == "periodic":
             return self._driven(weighted, np.zeros(len(self.chain.b)), adjoint=True)[::-1]
         return self._driven(weighted[1:], weighted[0], adjoint=True)[::-1]
@@ -76,12 +78,22 @@ class Cells:
 
     def costate_defects(self, mu: np.ndarray, p: np.ndarray) -> np.ndarray:
         """The sums over k of bounds of |p_k - p_{k+1} exp(A) - mu_k c|, shape (n,)."""
-        flow, c = self.chain.flow, self.chain.c
+        flow, c = self.chain.flow, self._seen
         following = p[1:] if self.start == "periodic" else np.vstack([p[1:], np.zeros(len(c))])
         p = p[:-1] if self.start == "periodic" else p
         size = np.abs(p) + np.abs(following) @ np.abs(flow) + np.abs(mu)[:, None] * np.abs(c)
         defect = np.abs(p - (following @ flow + mu[:, None] * c))
         return np.asarray((defect + self._roundings * size).sum(axis=0) * SPARE + len(p) * TINY)
+
+    @property
+    def jumps(self) -> bool:
+        """Whether y jumps where u does."""
+        return self.chain.d != 0
+
+    @property
+    def _seen(self) -> np.ndarray:
+        """What a weight is of, for each state; shape (n,)."""
+        return self.chain.mean[:-1] if self.jumps else self.chain.c
 
     @property
     def _roundings(self) -> float:
@@ -226,7 +238,7 @@ class Cells:
         n, kept = len(end), np.arange(len(end))
         follows, free = (n - 1, self.stable) if adjoint else (self.stable, n - 1)
         x = np.zeros(n)
-        if self.plant.integrators:
+        if self.plant.integrators > 0:
             x[kept != free] = np.linalg.lstsq(lacking[kept != follows][:, kept != free], end[kept != follows])[0]
         else:
             x[:] = np.linalg.lstsq(lacking, end)[0]

@@ -10,7 +10,7 @@ import numpy as np
 
 from design.blocks.state_space import block_diagonal
 from experiments.engine.saturated_loop import NO_RESETS, Resets
-from experiments.runs.steady_control import PI, Peak, peak, response
+from experiments.runs.steady_control import PI, UNIT, Peak, peak, response, steady_constant
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
@@ -103,18 +103,15 @@ class Reference:
     def required(self, plant: PlantModel) -> Peak:
         """The most that the control reaches which keeps the plant's output on r in the steady state, in its input unit.
 
-        It is the control (r/P)(t) = sum of amplitude_i/|P(j omega_i)| sin(omega_i t + phase_i - arg P(j omega_i)), a
-        constant of r over the gain of a plant that does not integrate, and slope/gain of a plant with one integrator.
-        Infinite for a slope that a plant without an integrator would have to follow. See
-        :func:`experiments.runs.steady_control.peak`.
+        It is the control (r/P)(t) = sum of amplitude_i/|P(j omega_i)| sin(omega_i t + phase_i - arg P(j omega_i)) and
+        what r's constant and slope take, see :func:`experiments.runs.steady_control.steady_constant`; infinite where
+        that grows for ever. See :func:`experiments.runs.steady_control.peak`.
         """
         parts = list(zip(self.amplitudes, self.omegas, self.phases_rad, strict=True))
-        constant = self.slope / plant.gain if plant.integrators == 1 else 0.0
-        if plant.integrators == 0:
-            if self.slope:
-                return Peak(math.inf, math.inf)
-            constant = (self.offset + sum(a * math.sin(phase) for a, omega, phase in parts if omega == 0)) / plant.gain
-        return peak([response(plant, *part) for part in parts if part[1] > 0], constant)
+        constants = [self.offset, *(a * math.sin(phase) for a, omega, phase in parts if omega == 0)]
+        constant = steady_constant(plant, math.fsum(constants), self.slope)
+        doubt = steady_constant(plant, 4 * UNIT * sum(map(abs, constants)), 0.0)
+        return peak([response(plant, *part) for part in parts if part[1] > 0], constant, abs(doubt))
 
     def generator(self) -> Generator:
         """Its oscillators, and a constant with its integral."""

@@ -45,12 +45,36 @@ def response(plant: PlantModel, amplitude: float, omega: float, phase_rad: float
     needed = amplitude / complex(plant.without_delay()(1j * omega))
     factors = [*plant.zero_modes, *plant.pole_modes]
     # a mode near its resonance cancels all but its damping
-    lost = sum((1 + omega / mode.omega) ** 2 * (1 + mode.zeta) / abs(complex(mode(1j * omega))) for mode in factors)
+    lost = sum(
+        (1 + omega / mode.omega) ** 2 * (1 + abs(mode.zeta)) / abs(complex(mode(1j * omega))) for mode in factors
+    )
     doubt = 16 * UNIT * (2 + lost + len(plant.real_zeros) + len(plant.real_poles))
     return Wave(abs(needed), omega, phase_rad + math.atan2(needed.imag, needed.real), doubt)
 
 
-def peak(waves: Sequence[Wave], constant: float) -> Peak:
+def steady_constant(plant: PlantModel, offset: float, slope: float) -> float:
+    """The constant control that keeps a plant's output on offset + slope t once its transients are over.
+
+    Parameters
+    ----------
+    plant
+        K/s^q times factors that are 1 at s = 0; its zeros may lie in either half plane.
+    offset, slope
+        In the output's unit, and in that unit a second.
+
+    Returns
+    -------
+    float
+        In the input's unit: offset/K for q = 0 and slope/K for q = 1; 0 for q = 2, since such a plant keeps its speed
+        by itself. Infinite where the control has to grow for ever: under a slope for q = 0, and under a constant or a
+        slope for q < 0, where the control is the integral of r/K.
+    """
+    if (slope and plant.integrators < 1) or (offset and plant.integrators < 0):
+        return math.inf
+    return {0: offset, 1: slope}.get(plant.integrators, 0.0) / plant.gain
+
+
+def peak(waves: Sequence[Wave], constant: float, doubt: float = 0.0) -> Peak:
     """The supremum over all time of |constant + sum of waves|.
 
     Parameters
@@ -58,7 +82,9 @@ def peak(waves: Sequence[Wave], constant: float) -> Peak:
     waves
         Any number of waves.
     constant
-        In their unit.
+        In their unit; infinite where the control grows for ever.
+    doubt
+        Bounds what the constant is off.
 
     Notes
     -----
@@ -67,7 +93,7 @@ def peak(waves: Sequence[Wave], constant: float) -> Peak:
     without a common period are taken as independent; by Kronecker's theorem they then come as near as one likes to
     all their largest sums at once. The upper bound is one whether they are independent or not.
     """
-    highest = lowest = error = 0.0
+    highest, lowest, error = 0.0, 0.0, doubt
     for group in _groups(waves):
         high, error_high = _largest(group, +1)
         low, error_low = _largest(group, -1)

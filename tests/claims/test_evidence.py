@@ -75,7 +75,7 @@ def test_omega_d1_of_table_2_1_does_not_give_7_952e4():
 
 def test_lambda_has_no_term_in_s(implied: IdentifiedModel):
     chosen = printed_numbers()["delay_free"]
-    units = internal_model(implied.plant, 2 * np.pi / chosen["reference"]["period_s"], chosen["epsilon"])
+    units = internal_model(implied.plant, [2 * np.pi / chosen["reference"]["period_s"]], chosen["epsilon"])
     assert all(root.real == 0 for root in units.one_plus_F.zeros)
 
 

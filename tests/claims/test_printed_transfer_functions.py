@@ -25,7 +25,7 @@ ROUNDING = 1e-9  # 30625 lies exactly at the end of what 3.062e4 allows
 def delay_free_blocks(plant: PlantModel) -> dict[str, Block]:
     """G_A, theta1 and theta2 of section 2.4."""
     chosen = printed_numbers()["delay_free"]
-    units = internal_model(plant, 2 * np.pi / chosen["reference"]["period_s"], chosen["epsilon"])
+    units = internal_model(plant, [2 * np.pi / chosen["reference"]["period_s"]], chosen["epsilon"])
     kind = second_order(chosen["alpha"], chosen["beta"], chosen["gamma"])
     return {
         "G_A_2": units.G_A,

@@ -172,7 +172,7 @@ def test_what_a_text_names(text: str, labels: set[str]) -> None:
 
 
 def test_only_docstring_and_comments_say_a_label() -> None:
-    said = said_of("design.blocks.block:require_thesis_class")
+    said = said_of("design.chapters_3_4.design_extended:is_of_thesis_class")
     assert "(2.20)" in labels_in(said)
     assert "(3.16)" not in labels_in(said)  # it stands in a message there
     said = said_of("paper_figures.thesis.figures.fig_2_12:draw")

@@ -33,6 +33,7 @@ from experiments.runs.design_loop import design_loop
 from experiments.runs.guarantee import guarantee_within
 from experiments.thesis.printed_choices import thesis_reference
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
@@ -75,6 +76,31 @@ def test_the_winding_number_counts_the_unstable_roots(name: str, request: pytest
     assert loop.unstable_roots(design.loop_plant) == 0
 
 
+@pytest.mark.parametrize(
+    "plant",
+    [
+        PlantModel(5.0, (), (Mode(60.0, 0.05),), 0.01, 2, (-40.0,), (80.0,)),
+        PlantModel(5.0, (Mode(50.0, -0.1),), (Mode(30.0, 0.1),), 0.02, 0, (), (3.0, 9.0)),
+        PlantModel(5.0, (), (), 0.02, 1, (-20.0,), (10.0, 30.0)),
+        PlantModel(50.0, (), (Mode(10.0, 0.3),), 0.01, -1),
+    ],
+)
+def test_the_unstable_roots_of_loops_of_every_kind(plant: PlantModel) -> None:
+    """Around plants with two integrators, none or a zero at s = 0, and zeros in the right half plane."""
+    bound = AdditiveBound(0.1 * abs(complex(plant(20j))), (), (), (), (100.0,))
+    design = design_extended(IdentifiedModel(plant, bound), [4.0])
+    random, loop, drawn = np.random.default_rng(2), PerturbedLoop(design), PlantsWithin(plant, bound)
+    found = []
+    for index in range(12):
+        true = drawn.draw(1, index).plant
+        if index > 1:  # far outside
+            true = replace(true, delay_s=true.delay_s + random.exponential(0.2))
+        found.append(loop.unstable_roots(true))
+        assert found[-1] == roots_right_of(delay_loop(design, true), 0.0)
+    assert len(set(found)) > 1
+    assert min(found) == 0
+
+
 def test_an_unstable_linear_loop_is_one_in_time(extended_design: Design) -> None:
     """Without limits it grows; a dead time beyond the audit's margin of 129.4 ms."""
     loop, plant = PerturbedLoop(extended_design), extended_design.loop_plant
@@ -89,10 +115,14 @@ def test_an_unstable_linear_loop_is_one_in_time(extended_design: Design) -> None
         assert (later > late) == unstable
 
 
-def test_another_integrator_is_refused(extended_design: Design) -> None:
+def test_another_integrator_or_unstable_pole_is_refused(extended_design: Design) -> None:
     loop, plant = PerturbedLoop(extended_design), extended_design.loop_plant
-    for true in (replace(plant, gain=1.01 * plant.gain), replace(plant, integrators=2)):
-        with pytest.raises(InputError, match="integrators differ"):
+    for true, words in (
+        (replace(plant, gain=1.01 * plant.gain), "integrators differ"),
+        (replace(plant, integrators=2), "integrators differ"),
+        (replace(plant, real_poles=(-3.0,)), "has 1 poles in the right half plane, the model 0"),
+    ):
+        with pytest.raises(InputError, match=words):
             loop.unstable_roots(true)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from design.anti_windup.compensator import from_one_plus
 from design.anti_windup.judge import Compensator, judge
 from design.blocks.block import Block
 from design.chapters_3_4.design_extended import design_extended
-from design.design_file import Design
+from design.design_file import Design, read_design
 from experiments.__main__ import main as experiments_main
 from experiments.thesis.commands import thesis
 from identification.model.model_file import IdentifiedModel
@@ -107,6 +108,9 @@ def test_design_refuses_bad_plants(runner: CliRunner, tmp_path: Path, member: st
         (["delay-free", "implied", "--period", "-4", *EPSILON], "period"),
         (["delay-free", "implied", "--period", "nan", *EPSILON], "period"),
         (["delay-free", "implied", "--period", "4", "--epsilon", "99"], "epsilon"),
+        (["delay-free", "implied", "--period", "4"], "of --epsilon and --integral-action none is given"),
+        (["delay-free", "implied", "--period", "4", *EPSILON, "--integral-action"], "both are given; expected one"),
+        (["delay-free", "implied", "--period", "4", "--period", "4", *EPSILON], "expected each frequency once"),
         (["extended", "implied", "--reference-omega", "0", "--a", "4", "--e", "2", "--f", "1"], "0 frequencies above"),
         (["extended", "implied", "--reference-omega", "-1", "--a", "4", "--e", "2", "--f", "1"], "omega >= 0"),
         (["extended", "implied", "--reference-omega", "1.5", "--a", "4", "--e", "2"], "--f 0 times"),
@@ -136,6 +140,21 @@ def test_design_refuses_bad_numbers(runner: CliRunner, tmp_path: Path, arguments
     output = tmp_path / "design.json"
     refused(runner.invoke(design_main, [*arguments, "--output", str(output)]), part)
     assert not output.exists()
+
+
+def test_integral_action_hides_no_integrator(runner: CliRunner, tmp_path: Path) -> None:
+    written = {}
+    for option in (EPSILON, ["--integral-action"]):
+        output = tmp_path / "design.json"
+        arguments = ["delay-free", "implied", "--period", "4", "--period", "1.5", *option, "--output", str(output)]
+        result = runner.invoke(design_main, arguments)
+        assert result.exit_code == 0
+        assert ("C hides the integrator of the plant" in result.output) == (option is EPSILON)
+        written[option[0]] = read_design(output)
+    for name, design in written.items():
+        assert design.reference_omegas == (2 * math.pi / 4, 2 * math.pi / 1.5)
+        C = design.controller_parts()[0]
+        assert (0 in C.zeros, 0 in C.poles) == ((True, False) if name == "--epsilon" else (False, True))
 
 
 def test_design_refuses_a_missing_folder(runner: CliRunner, tmp_path: Path) -> None:

@@ -172,7 +172,7 @@ def test_2_2_lambda_takes_the_poles_off_the_reference(seed: int) -> None:
     R = np.array([z.row @ np.linalg.solve(at * np.eye(len(z.start)) - z.matrix, z.start) for at in s])
     # the Laplace transform of 50 sin(omega t + phase)
     np.testing.assert_allclose(R, 50 * (s * np.sin(phase) + omega * np.cos(phase)) / (s**2 + omega**2), rtol=1e-9)
-    Lambda = reference_polynomial(omega, 1e-4)
+    Lambda = reference_polynomial([omega], 1e-4)
     np.testing.assert_allclose(Lambda(s), (s**2 + 1e-4) * (s**2 + omega**2), rtol=1e-12)
     R_0_of_s = Lambda(s) * R
     cubic = np.linalg.solve(np.vander(s[:4], 4), R_0_of_s[:4])
@@ -188,7 +188,7 @@ def test_2_3_the_plant_is_B_over_A_and_so_is_F_1(seed: int) -> None:
     assert not B.poles + A.poles  # polynomials
     np.testing.assert_allclose(plant_block(plant)(s), plant.gain / s * R_0(plant, s), rtol=1e-10)
     np.testing.assert_allclose(B(s) / A(s), plant.gain / s * R_0(plant, s), rtol=1e-10)
-    np.testing.assert_allclose(internal_model(plant, 1.5, 1e-4).F1(s), B(s) / A(s), rtol=1e-10)
+    np.testing.assert_allclose(internal_model(plant, [1.5], 1e-4).F1(s), B(s) / A(s), rtol=1e-10)
 
 
 def test_lemma_1_the_error_of_the_linear_loop_dies_out(delay_free_design: Design) -> None:
@@ -197,7 +197,7 @@ def test_lemma_1_the_error_of_the_linear_loop_dies_out(delay_free_design: Design
     plant = delay_free_design.plant.without_delay()
     s = points(np.random.default_rng(0))
     A, B, Lambda = plant_denominator(plant), plant_numerator(plant), blocks["Lambda"]
-    units = internal_model(plant, omega, delay_free_design.parameters.epsilon)
+    units = internal_model(plant, [omega], delay_free_design.parameters.epsilon)
     one_plus_F = 1 + units.F1(s) * units.F2(s)
     loop = design_loop(delay_free_design, sinusoid(50.0, omega, 0.7, 0.0), None)
     found = [signals(loop, complex(at), free=True) for at in s]
@@ -214,7 +214,7 @@ def test_lemma_1_the_error_of_the_linear_loop_dies_out(delay_free_design: Design
 def test_2_4_to_2_6_the_internal_model(seed: int) -> None:
     random = np.random.default_rng(seed)
     plant, omega = random_plant(random).without_delay(), float(random.uniform(0.5, 5))
-    units, s = internal_model(plant, omega, 1e-4), points(random)
+    units, s = internal_model(plant, [omega], 1e-4), points(random)
     A, B = plant_denominator(plant)(s), plant_numerator(plant)(s)
     Lambda = (s**2 + 1e-4) * (s**2 + omega**2)
     np.testing.assert_allclose(1 + units.F1(s) * units.F2(s), Lambda / A, rtol=1e-6)  # (2.4)
@@ -228,7 +228,7 @@ def test_remark_1_the_weights_hold_the_reference_and_the_uncertainty(delay_free_
     design = delay_free_design
     assert design.hinf is not None
     W_1, W_2, rate = design.hinf.W1, design.hinf.W2, design.hinf.decay_rate
-    Lambda = reference_polynomial(*design.reference_omegas, design.parameters.epsilon)
+    Lambda = reference_polynomial(design.reference_omegas, design.parameters.epsilon)
     np.testing.assert_allclose(W_1.poles, np.array(Lambda.zeros) - 2 * rate, rtol=1e-12)
     s = 1j * np.geomspace(0.1, 1e3, 300)
     G = design.plant.without_delay()

@@ -78,7 +78,7 @@ def test_a_run_that_diverges_has_empty_cells(
     assert set(zip(gone["run"], gone["method"], strict=True)) == {("thesis", "exact")}
     assert gone["settling_s"].isna().all()
 
-    def diverging(*_arguments: object) -> None:
+    def diverging(*_arguments: object, **_options: object) -> None:
         raise DivergenceError(1.0)
 
     monkeypatch.setattr(sampled_rates, "simulate_sampled", diverging)

@@ -72,7 +72,7 @@ def internal_model_principle(inputs: Inputs) -> Statements:
     proper = {
         factors: Block(1.0, blocks["G_A"].zeros, polynomial.zeros).relative_degree >= 0
         for factors, polynomial in {
-            "with": reference_polynomial(omega, printed_numbers()["delay_free"]["epsilon"]),
+            "with": reference_polynomial([omega], printed_numbers()["delay_free"]["epsilon"]),
             "without": Block(1.0, (1j * omega, -1j * omega)),
         }.items()
     }

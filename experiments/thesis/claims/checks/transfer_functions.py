@@ -149,7 +149,7 @@ def _anti_windup() -> tuple[float, float, float]:
 
 def _internal_model(inputs: Inputs) -> InternalModel:
     chosen = printed_numbers()["delay_free"]
-    return internal_model(plant_of(inputs), 2 * np.pi / chosen["reference"]["period_s"], chosen["epsilon"])
+    return internal_model(plant_of(inputs), [2 * np.pi / chosen["reference"]["period_s"]], chosen["epsilon"])
 
 
 def _free_part(plant: PlantModel) -> FreePart:
