@@ -24,8 +24,6 @@ from identification.base.arrays import Real
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
-SPARE = 1e-6  # of Q's scale, by which the inequality is strict
-
 
 def weston_postlethwaite(plant: PlantModel, bandwidth: float) -> AntiWindup:
     """P = N M^-1 with M = F (sI - A - b F)^-1 b + 1 of full order: the F whose gain is least.
@@ -47,40 +45,38 @@ def weston_postlethwaite(plant: PlantModel, bandwidth: float) -> AntiWindup:
     InputError
         No F is found.
     """
-    block = plant_block(plant)
+    block = plant_block(plant).without_delay()
     if not block.poles:
         raise InputError("the plant has no pole, so that there are no coprime factors to choose")
-    system, unit, k = _scaled(block), _unit(block), _sector(block)
-    A, b, c = system.A, system.b[:, None], system.C
     import cvxpy as cp
 
+    unit = geometric_scale(block)
+    A, b, c = _in_unit(realize(block), unit)
     Q, L, U = cp.Variable((len(b), len(b)), symmetric=True), cp.Variable((1, len(b))), cp.Variable((1, 1))
     moved = A @ Q + b @ L
-    radius = max(bandwidth, max(map(abs, block.poles))) / unit
+    radius = max(bandwidth, *map(abs, block.poles)) / unit
     disk = cp.bmat([[radius * Q, moved], [moved.T, radius * Q]]) >> 0
-    _least(Q, U, moved, b @ U, L, c @ Q, k, [disk], "Weston and Postlethwaite's anti-windup")
+    _solve(Q, U, moved, b @ U, -L, c @ Q, _sector(block), [disk])
     F = np.linalg.solve(Q.value, L.value.T).T
-    return from_one_plus(Block(1.0, block.poles, _roots(A + b @ F, unit)))
+    return from_one_plus(Block(1.0, block.poles, _eigenvalues(A + b @ F, unit)))
 
 
-def static(plant: PlantModel, g: Block, poles: Sequence[complex], bandwidth: float) -> AntiWindup:
+def static(plant: PlantModel, g: Block, poles: Sequence[complex]) -> AntiWindup:
     """A constant gain from u~ to the controller's states: M = g (1 - c (sI - A)^-1 f), f the gain of least L2 gain.
 
     E. F. Mulder, M. V. Kothare and M. Morari, "Multivariable anti-windup controller synthesis using linear matrix
-    inequalities", Automatica 37, 2001. A gain from u~ to the control itself scales u~, and changes nothing. The states
-    with a dead time take the gain that keeps it out of M, :func:`design.anti_windup.other_anti_windups.observer`, and
-    f goes to the others; so the inequality is exact for the loop with its dead time.
+    inequalities", Automatica 37, 2001. A gain from u~ to the control itself only scales u~. The states with a dead time
+    take the gain that keeps it out of M, that of :func:`design.anti_windup.other_anti_windups.observer`, and f goes to
+    the others: so the inequality is exact for the loop with its dead time.
 
     Parameters
     ----------
     plant
         P; for the sector see :func:`weston_postlethwaite`.
     g
-        M of f = 0; P g is stable.
+        M of f = 0.
     poles
-        Of the states that f goes to, all stable, in rad/s.
-    bandwidth
-        In rad/s; no zero of 1 - c (sI - A)^-1 f lies beyond, or beyond the fastest of the poles.
+        Of the states that f goes to, in rad/s.
 
     Raises
     ------
@@ -88,28 +84,57 @@ def static(plant: PlantModel, g: Block, poles: Sequence[complex], bandwidth: flo
         P g or a pole is not stable, or no gain is found.
     """
     block = plant_block(plant).without_delay()
-    if not (block * g).is_stable or any(pole.real >= 0 for pole in poles):
+    own = Block(1.0, (), tuple(poles))
+    if not ((block * g).is_stable and own.is_stable and poles):
         raise InputError(
-            "the controller cancels the plant's pole with Re s >= 0, so that no gain to its states makes theta2 "
-            "stable; expected an extended design"
+            "no constant gain to the controller's states makes theta2 stable: the controller cancels the plant's poles "
+            "with Re s >= 0; expected an extended design"
         )
-    if not poles:
-        raise InputError("the controller has no states that a static anti-windup could drive")
     import cvxpy as cp
 
-    unit, k = geometric_scale(block, g, Block(1.0, (), tuple(poles))), _sector(block)
-    own = realize(Block(1.0, (), tuple(poles)).shifted(0.0))
-    A_f, c_f = own.A.T / unit, own.b[None, :]  # the transpose: observable from one output, driven anywhere
-    rest = realize(g, block * g)
-    n, m = len(A_f), len(rest.b)
-    b_r = rest.b[:, None]
-    A = np.block([[A_f, np.zeros((n, m))], [-b_r @ c_f, rest.A / unit]])
-    # M - 1 and y_d over the states (of f, of g and P g)
-    c_u = np.hstack([-c_f, rest.C[:1]])
-    c_d = np.hstack([np.zeros((1, n)), rest.C[1:]])
+    unit = geometric_scale(block, g, own)
+    A, b, _ = _in_unit(realize(own), unit)
+    A_f, c_f = A.T, b.T  # every f gives another numerator
+    A_g, b_g, c_g = _in_unit(realize(g, block * g), unit)
+    n, m = len(A_f), len(A_g)
+    full = np.block([[A_f, np.zeros((n, m))], [-b_g @ c_f, A_g]])
     Q, X, U = cp.Variable((n + m, n + m), symmetric=True), cp.Variable((n, 1)), cp.Variable((1, 1))
-    driven = cp.vstack([X, b_r @ U]) if m else X
-    _least(Q, U, A @ Q, driven, c_u @ Q, c_d @ Q, k, [], "the static anti-windup")
-    f = X.value / U.value
-    zeros = _roots(A_f - f @ c_f, unit)
-    return from_one_plus(g * Block(1.0, zeros, tuple(poles)))
+    theta1_tilde, y_d = np.hstack([-c_f, c_g[:1]]), np.hstack([np.zeros((1, n)), c_g[1:]])
+    _solve(Q, U, full @ Q, cp.vstack([X, b_g @ U]), -theta1_tilde @ Q, y_d @ Q, _sector(block), [])
+    return from_one_plus(g * Block(1.0, _eigenvalues(A_f + X.value @ c_f / U.value, unit), tuple(poles)))
+
+
+def _in_unit(system: StateSpace, unit: float) -> tuple[Real, Real, Real]:
+    """A, b (n, 1) and C with the time in 1/unit seconds."""
+    return system.A / unit, system.b[:, None] / unit, system.C
+
+
+def _sector(block: Block) -> float:
+    return 1.0 if block.is_stable else SECTOR
+
+
+def _eigenvalues(A: Real, unit: float) -> tuple[complex, ...]:
+    return tuple(complex(root) * unit for root in np.linalg.eigvals(A))
+
+
+def _solve(Q: Any, U: Any, AQ: Any, bU: Any, minus_cQ: Any, y_dQ: Any, k: float, more: list[Any]) -> None:
+    """Give Q, U and the gain their values; raises InputError where the solver finds none."""
+    import cvxpy as cp
+
+    gain, one = cp.Variable((1, 1)), np.eye(1)
+    none = np.zeros((Q.shape[0], 1))
+    inequality = cp.bmat(
+        [
+            [AQ + AQ.T, bU + k * minus_cQ.T, none, y_dQ.T],
+            [bU.T + k * minus_cQ, -2 * U, k * one, 0 * one],
+            [none.T, k * one, -gain, 0 * one],
+            [y_dQ, 0 * one, 0 * one, -gain],
+        ]
+    )
+    problem = cp.Problem(cp.Minimize(gain[0, 0]), [inequality << 0, Q >> 0, *more])
+    try:
+        problem.solve(solver=cp.CLARABEL)
+    except cp.SolverError:
+        pass
+    if problem.status not in ("optimal", "optimal_inaccurate"):
+        raise InputError(f"the linear matrix inequality has no solution for the sector {k:g} ({problem.status})")

@@ -16,47 +16,19 @@ time in it although S = 1 - T_so T_si has one:
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from design.anti_windup.compensator import AntiWindup, from_one_plus, plus_one
+from design.anti_windup.corrected_compensator import SETTLED
 from design.anti_windup.least_gain import static, weston_postlethwaite
+from design.anti_windup.linear_loop import LinearLoop
 from design.blocks.block import Block, from_polynomial, plant_block
-from design.choices import SETTLED
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
 AROUND_ZERO = 1e-2  # of the slowest root: the circle in which zeros at s = 0 are counted
 ON_CIRCLE = 400  # points
-"""How finely the turns of 1 - T around that circle are followed."""
-
-
-@dataclass(frozen=True)
-class LinearLoop:
-    """What an anti-windup may be made of.
-
-    Parameters
-    ----------
-    plant
-        P as the design sees it.
-    forward, feedback
-        C = forward/(1 - feedback exp(-h s)), h the plant's dead time; without a feedback of chapter 2.
-    pole
-        a of T_so in rad/s; None in chapter 2.
-    omegas
-        Frequencies of the reference in rad/s.
-    recovery_s, bandwidth
-        Of the design's corrected anti-windup: the pace and the fastest pole of others that leave them free.
-    """
-
-    plant: PlantModel
-    forward: Block
-    feedback: Block
-    pole: float | None
-    omegas: tuple[float, ...]
-    recovery_s: float
-    bandwidth: float
 
 
 class BackCalculation(AntiWindup):
@@ -144,8 +116,8 @@ def internal_model(loop: LinearLoop) -> AntiWindup:
 
 def _static(loop: LinearLoop) -> AntiWindup:
     if loop.pole is not None:
-        return static(loop.plant, observer(loop).one_plus, loop.forward.poles, loop.bandwidth)
-    return static(loop.plant, Block(1.0), _sensitivity(loop).poles, loop.bandwidth)
+        return static(loop.plant, observer(loop).one_plus, loop.forward.poles)
+    return static(loop.plant, Block(1.0), _sensitivity(loop).poles)
 
 
 OTHERS: Mapping[str, Callable[[LinearLoop], AntiWindup]] = {
