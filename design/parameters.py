@@ -16,10 +16,13 @@ class DelayFreeParameters:
 
     Parameters
     ----------
+    period_s
+        The longest period of the reference in seconds.
     epsilon
         Of the factor s^2 + epsilon of Lambda, in rad^2/s^2; None for integral action.
     """
 
+    period_s: float
     epsilon: float | None
 
     def to_dict(self) -> dict[str, Any]:

@@ -91,9 +91,9 @@ def certificate(M: Block) -> Rows:
             Fraction(1), size, Fraction(1), squared_on_axis(multiplied(above, real_polynomial(M.poles[k:])))
         )
     slack = SLACK
-    while not_positive_at(factored := combined(Fraction(2), real, -slack, size)[at_zero:]) is not None:
+    while at_zero > 1 or not_positive_at(factored := combined(Fraction(2), real, -slack, size)[at_zero:]) is not None:
         slack /= 10
-        if at_zero > 1 or slack < LEAST_SLACK:
+        if slack < LEAST_SLACK:
             raise InputError(f"1 + theta1~ with the zeros {M.zeros} is not positive real; expected Re M > 0")
     with ctx.workprec(BITS):
         found: Any = fmpq_poly([_exact(value) for value in factored]).complex_roots()

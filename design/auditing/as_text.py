@@ -58,8 +58,10 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
         lines += ["", "H-infinity stabiliser, ||[W1 S; W2 T]||", *_hinf_lines(found.stabiliser, found.infimum)]
     without = ", for the plant without its dead time" if found.with_delay is not None else ""
     lines += ["", f"Anti-windup{without}", *_columns(_anti_windup_rows(found, windup))]
+    own = design.corrected
+    lines += ["", f"The guarantee of the corrected one is {own.guarantee}: {own.guarantee_said}."]
     alpha, beta, gamma, f = found.least_f
-    bandwidth = design.corrected.bandwidth
+    bandwidth = own.bandwidth
     lines += [
         "",
         f"The best found of (2.23) with no pole beyond {bandwidth:g} rad/s: alpha = {alpha:.4g} s, "

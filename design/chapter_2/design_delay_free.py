@@ -139,7 +139,7 @@ def design_delay_free(
             "theta2": thesis.kind.theta2(plant.without_delay()),  # Eq. (2.18)
         },
         hinf=synthesis,
-        parameters=DelayFreeParameters(epsilon),
+        parameters=DelayFreeParameters(float(np.max(period_s)), epsilon),
         thesis=thesis,
         corrected=corrected,
     )

@@ -127,7 +127,7 @@ def design_of(kind: str) -> Design:
         reference_omegas=(1.5,),
         blocks={"K": Block(1.0, (), (1 + 0j,)), "C0": Block(1.0), "T_so": Block(1.0, (), (-4 + 0j, -1 + 2j, -1 - 2j))},
         hinf=Synthesis(0.3125, "", 0.375, 0.5, 0.3125, "", 0.375, Block(1.0), Block(1.0)) if delay_free else None,
-        parameters=DelayFreeParameters(1e-4) if delay_free else ExtendedParameters(4.0, (), "zeros", 0.0, {}),
+        parameters=DelayFreeParameters(4.0, 1e-4) if delay_free else ExtendedParameters(4.0, (), "zeros", 0.0, {}),
         thesis=PrintedCompensator(second_order(0.03, 0.02, 48.5), judged, 0.03, 0.02, 48.5),
         corrected=CorrectedCompensator(
             second_order(0.5, 0.5, -1.0),

@@ -37,6 +37,12 @@ CHAPTER_4 = sinusoid(50.0, 1.5, np.pi / 2, 0.0)
 AMPLITUDE = 50 * 1.5 / 7.105  # of the control that follows it, but for the modes
 
 
+@pytest.fixture(scope="module")
+def extended_design(implied: IdentifiedModel) -> Design:
+    """The design of chapter 4 for a sector, which promises nothing beyond it."""
+    return design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], sector=0.95)
+
+
 def judged(
     design: Design,
     limits: tuple[float, float],
@@ -186,7 +192,7 @@ def test_the_promise_is_kept(extended_design: Design, phase: float, limit: float
 
 def test_the_promise_is_kept_within_the_bound(implied: IdentifiedModel) -> None:
     """The same for plants within W_a, v and v_s being those of each one's own linear loop."""
-    design = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.5)
+    design = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.5, sector=0.95)
     kind = design.compensator("corrected")
     given_within = guarantee_within(design, kind)
     assert 0.9 < given_within.sector < circle_sector(kind.theta1_tilde)
@@ -277,7 +283,7 @@ LIMIT_CYCLE = IdentifiedModel(
 @pytest.fixture(scope="module")
 def limit_cycle() -> Design:
     """Its corrected anti-windup does not let a step of 1 settle under +-5."""
-    return design_extended(LIMIT_CYCLE, reference_omegas=[0.0], a=20.0, pairs=[])
+    return design_extended(LIMIT_CYCLE, reference_omegas=[0.0], a=20.0, pairs=[], sector=0.95)
 
 
 def said(command: str, design: Design, folder: Path, *arguments: str) -> str:
