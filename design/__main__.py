@@ -246,6 +246,7 @@ def audit_command(design: Path, windup: float) -> None:
         raise InputError(f"--windup is {windup:g}; expected a number of less than 1e100")
     content = read_design(design)
     click.echo(audit_text(content, audit(content), windup))
+    click.echo(f"\n{_compared(content)}")
 
 
 def _coefficients(text: str, option: str) -> list[float]:
@@ -261,6 +262,7 @@ def _coefficients(text: str, option: str) -> list[float]:
 def _finish(design: Design, model: str, output: Path, summary: str) -> None:
     text = design.to_json()
     write_whole({output: lambda path: path.write_text(text, encoding="utf-8")}, inputs=[Path(model)])
+    click.echo(_compared(design))
     click.echo(f"{design.kind} design -> {output}")
     click.echo(f"  {summary}")
     for name, each in design.anti_windup.items():
@@ -268,6 +270,16 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
         sector = "any" if judged.popov_sector is None else lower_end(judged.popov_sector, 4)
         stable = "stable" if judged.theta2_stable else "NOT stable: a lasting offset after saturation"
         click.echo(f"  anti-windup {name:9s} f = {judged.f:.4g}, Popov sector {sector}, theta2 {stable}")
+
+
+def _compared(design: Design) -> str:
+    """What each anti-windup does beside none in one run, the one that does harm first; or why there is no run."""
+    from experiments.runs.against_none import against_none
+
+    try:
+        return str(against_none(design))
+    except InputError as error:
+        return f"not compared with no anti-windup: {error}"
 
 
 if __name__ == "__main__":

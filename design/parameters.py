@@ -96,6 +96,12 @@ class ExtendedParameters:
     roll_off: RollOff | None = None
     reasons: tuple[str, ...] = ()
 
+    @property
+    def pace(self) -> float:
+        """a, or the rate of the roll-off where it is slower, rad/s."""
+        roll_off = self.roll_off
+        return self.a if roll_off is None or not roll_off.order else min(self.a, roll_off.rate)
+
     def to_dict(self) -> dict[str, Any]:
         """The ``parameters`` of design.json."""
         content: dict[str, Any] = {

@@ -69,7 +69,7 @@ def design_extended(
         :data:`design.choices.ROBUST_LEVEL`, and T_so of the thesis's class with a given a does not roll off.
     recovery_s, sector, bandwidth, guarantee
         Of the corrected anti-windup, see :func:`design.anti_windup.judge.compensators`; unless given, the recovery
-        takes no longer than exp(-a t) takes to 1 %.
+        takes no longer than exp(-a t) takes to 1 %, or the roll-off where it is slower.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def design_extended(
         T_so, parameters = _rolled_off(model, omegas, a, pairs, level)
     K = stabiliser(plant, T_so, inverse_epsilon)
     T_si, P_o = inner_outer(plant)
-    own_s = float(np.log(1 / SETTLED)) / parameters.a
+    own_s = float(np.log(1 / SETTLED)) / parameters.pace
     robustness = robustness_of(DelayLoop(plant_block(plant), K, (T_so * T_si).without_delay(), plant.delay_s), bound)
     measured = model.fit.band[1] if model.fit else None
     thesis, corrected = compensators(
@@ -151,9 +151,10 @@ def _rolled_off(
     """T_so of any plant, which rolls off as late as W_a allows."""
     plant, bound = model.plant, model.additive_bound
     wanted, reasons = _possible(plant, bound, omegas, level)
+    order = None
     if a is None:
         pace = chosen_pace(plant, bound, wanted, level, model.fit.band[1] if model.fit else None)
-        a = pace.a
+        a, order = pace.a, pace.order
         reasons.append(f"a = {a:.4g} rad/s: {pace.reason}")
     if pairs is None:
         pairs = pairs_of(a, wanted.omegas)
@@ -161,7 +162,7 @@ def _rolled_off(
             f"e = {e:.4g} rad/s, f = {f:.4g} rad^2/s^2: poles of real part -a, no slower than the sinusoid"
             for e, f in pairs
         ]
-    found = robust_outer_part(plant, bound, wanted, a, fixed_poles(wanted, a, pairs), level)
+    found = robust_outer_part(plant, bound, wanted, a, fixed_poles(wanted, a, pairs), level, order)
     poles = "one pole" if found.order == 1 else f"{found.order} poles"
     reasons.append(
         f"T_so rolls off with {poles} at {found.rate:.4g} rad/s: the latest found with |W_a C S| <= {level:g}"

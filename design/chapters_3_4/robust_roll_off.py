@@ -96,6 +96,7 @@ def robust_outer_part(
     a: float,
     poles: Sequence[complex],
     level: float,
+    order: int | None = None,
 ) -> Redesign:
     """The latest roll-off found of T_so with ||W_a C S|| <= level: the loop around every plant within W_a is stable.
 
@@ -109,6 +110,8 @@ def robust_outer_part(
         How fast the loop is to be, rad/s: rates from a hundredth of it, or of the slowest sinusoid, are tried.
     level
         Between 0 and 1.
+    order
+        Of the roll-off; every one from the least to MOST_POLES more unless given.
 
     Raises
     ------
@@ -127,14 +130,15 @@ def robust_outer_part(
     """
     floor = require_possible(plant, bound, wanted, level)
     loop = Loop(plant, bound, wanted, poles)
-    limit, order_least = level * (1 - CERTIFIED), least_order(plant)
+    limit, least = level * (1 - CERTIFIED), least_order(plant)
+    orders = range(least, least + MOST_POLES + 1) if order is None else (order,)
     coarse = frequency_grid(loop.roots, COARSE)
     met: list[Redesign] = []
     best = np.inf
     fast = 10 * max(fastest_root(plant_block(plant), bound_block(bound)), a)
     slow = min(a, *wanted.omegas) / 100
     rates = np.geomspace(fast, slow, int(PER_DECADE * np.log10(fast / slow)) + 2)
-    for order in range(order_least, order_least + MOST_POLES + 1):
+    for order in orders:
         tried = rates if order else rates[:1]
         seen = loop.robustness(coarse, tried, order).max(axis=1)
         best = min(best, float(seen.min()))
@@ -146,7 +150,7 @@ def robust_outer_part(
     if met:
         return min(met, key=lambda redesign: redesign.sensitivity)
     raise InputError(
-        f"no roll-off tried, of up to {order_least + MOST_POLES} poles, brings ||W_a C S|| below {best:.4g}, the level "
+        f"no roll-off tried, of up to {orders[-1]} poles, brings ||W_a C S|| below {best:.4g}, the level "
         f"is {level:g}; expected a slower a, e and f (no controller gets below {floor:.4g})"
     )
 

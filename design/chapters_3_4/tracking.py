@@ -213,7 +213,10 @@ class RolledOff:
         s = 1j * np.asarray(omega)
         basis = np.stack([(s / self.unit) ** k for k in range(self.wanted.count)], axis=1) @ self._basis
         fixed = s**self.wanted.zeros_at_zero / np.prod(s[:, None] - self.poles, axis=1)
-        return np.asarray((values @ basis.T) * fixed / (1 + s / rate[:, None]) ** order)
+        found, factor = (values @ basis.T) * fixed, 1 / (1 + s / rate[:, None])
+        for _ in range(order):  # numpy raises complex numbers to powers by their logarithms
+            found *= factor
+        return np.asarray(found)
 
     def _rolled(self, point: complex, series: Complex, rate: Real, order: int) -> Complex:
         """The Taylor coefficients of the target with the roll-off, (m, terms), in powers of (s - point)/unit."""

@@ -11,7 +11,6 @@ from design.design_file import Design
 from experiments.engine.simulate import DivergenceError, limit_pair
 from experiments.runs.references import Reference
 from experiments.runs.simulate_design import SAMPLES, simulate_design
-from identification.base.digits import told_apart
 
 ROOM = 1.2
 """Limits over what the reference needs, unless limits are given."""
@@ -69,12 +68,14 @@ class Comparison:
     def _sentence(self, name: str) -> str:
         own, none = self.outcomes[name], self.outcomes["none"]
         times = [_seconds(each.recovery_s) for each in (own, none)]
-        errors = told_apart(100 * own.last_error, 100 * none.last_error, 3, lambda value, digits: f"{value:.{digits}g}")
+        errors = [_percent(each.last_error) for each in (own, none)]
         low, high = self.limits
         limits = f"+-{high:.4g}" if low == -high else f"{low:.4g} to {high:.4g}"
+        worse = "WORSE" if self.is_worse(name) else "no worse"
         return (
-            f"{name} is {'WORSE' if self.is_worse(name) else 'no worse'} than no anti-windup under the limits {limits}: "
-            f"it recovers {times[0]} (none {times[1]}), is {errors[0]} % off in the last period (none {errors[1]} %), "
+            f"{name} is {worse} than no anti-windup under the limits {limits}: it recovers {times[0]} "
+            f"(none {times[1]}), "
+            f"is {errors[0]} off in the last period (none {errors[1]}), "
             f"and |u| reaches {own.largest_control:.3g} times the limit (none {none.largest_control:.3g})"
         )
 
@@ -126,6 +127,10 @@ def against_none(
             largest_control=float(np.abs(run.control).max()) / max(-limits[0], limits[1]),
         )
     return Comparison(limits, outcomes)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %" if share >= 1e-5 else "less than 0.001 %"
 
 
 def _seconds(time_s: float) -> str:

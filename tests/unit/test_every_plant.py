@@ -1,0 +1,172 @@
+"""Extended designs of the whole class: what T is at the points, internal stability, the level, units, refusals."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from design.blocks.block import plant_block
+from design.chapters_3_4.design_extended import design_extended
+from design.chapters_3_4.tracking import outer_part, tracking_conditions
+from design.design_file import Design, read_design
+from design.stability.characteristic_roots import roots_right_of
+from design.stability.margins import delay_loop
+from experiments.runs.references import sinusoid
+from experiments.runs.simulate_design import simulate_design
+from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
+from identification.model.model_file import IdentifiedModel
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
+
+
+def random_plant(random: np.random.Generator) -> PlantModel:
+    """Any number of roots of every kind but in the right half plane, where there may be one zero."""
+    scale = 10.0 ** random.uniform(-2, 3)
+    integrators = int(random.integers(0, 3))
+    modes = [
+        Mode(scale * 10.0 ** random.uniform(0, 1.5), 10.0 ** random.uniform(-2, -0.5))
+        for _ in range(random.integers(0, 5))
+    ]
+    poles = [scale * 10.0 ** random.uniform(-1, 1) for _ in range(random.integers(1, 4))]
+    zeros = [scale * 10.0 ** random.uniform(0, 1) for _ in range(random.integers(0, 2))]
+    if random.random() < 0.4:
+        zeros.append(-scale * 10.0 ** random.uniform(0.5, 1.5))
+    half = len(modes) // 2
+    return PlantModel(
+        10.0 ** random.uniform(-3, 3) * random.choice([-1, 1]),
+        tuple(modes[:half]),
+        tuple(modes[half:]),
+        10.0 ** random.uniform(-2, -0.5) / scale,
+        integrators,
+        tuple(zeros[: integrators + len(poles) + 2 * (len(modes) - 2 * half) - 1]),
+        tuple(poles),
+    )
+
+
+def bound_of(plant: PlantModel, omega: float, share: float = 0.05) -> AdditiveBound:
+    """A W_a that is a share of the plant's size around a frequency, and has a resonance ten times above it."""
+    size = share * float(np.abs(plant(1j * omega * np.array([0.01, 1.0, 2.7]))).min())
+    return AdditiveBound.printed_form(size, 3 * omega, 10 * omega, 0.3)
+
+
+@pytest.fixture(scope="module", params=range(24))
+def design(request: pytest.FixtureRequest) -> Design:
+    random = np.random.default_rng(request.param)
+    plant = random_plant(random)
+    slowest = min((abs(root) for root in plant_block(plant).poles if root), default=1 / plant.delay_s)
+    omega = slowest * 10.0 ** random.uniform(-0.7, 0.3)
+    omegas = [omega] if random.random() < 0.6 else [omega, 2.7 * omega]
+    return design_extended(IdentifiedModel(plant, bound_of(plant, omega)), omegas)
+
+
+def test_every_plant_has_a_stable_loop_that_tracks(design: Design) -> None:
+    plant, wanted = design.plant, tracking_conditions(design.plant, design.reference_omegas)
+    K, T_so, T_si = (design.blocks[name] for name in ("K", "T_so", "T_si"))
+    assert T_so.is_stable
+    assert K.is_stable
+    assert K.relative_degree >= 0
+    for omega in wanted.omegas:
+        assert complex(T_so(1j * omega) * T_si(1j * omega)) == pytest.approx(1.0, abs=1e-9)
+    # 1 - T vanishes at s = 0 once more than the plant has poles there, as a difference of orders of s
+    small = 1e-3 * min(abs(pole) for pole in T_so.poles + plant_block(plant).poles if pole)
+    left = np.abs(1 - T_so(np.array([small, small / 2])) * T_si(np.array([small, small / 2])))
+    assert math.log2(left[0] / left[1]) == pytest.approx(plant.integrators + 1, abs=0.05)
+    # the poles of the loop, by the argument principle
+    assert roots_right_of(delay_loop(design, plant), 0.0) == 0
+    # C S = K on the axis, from C
+    omega = np.geomspace(1e-2, 1e3, 400) * wanted.omegas[0]
+    s = 1j * omega
+    C = K(s) / (1 - T_so(s) * T_si(s))
+    C_S = C / (1 + plant(s) * C)
+    assert np.abs(design.additive_bound(s) * C_S).max() <= design.free.roll_off.level * (1 + 1e-6)
+
+
+def test_it_follows_in_time(design: Design) -> None:
+    omega = design.reference_omegas[0]
+    until = 25 / design.free.pace + 4 * math.pi / omega
+    run = simulate_design(design, math.inf, sinusoid(1.0, omega), None, until_s=until)
+    last = np.abs(run.outputs["error"][run.time_s > until - math.pi / omega])
+    assert last.max() < 1e-4
+
+
+@pytest.mark.parametrize("time", [1e-3, 1e4])
+def test_another_unit_of_time_is_the_same_design(time: float) -> None:
+    random = np.random.default_rng(5)
+    plant = random_plant(random)
+    bound = bound_of(plant, 1.0)
+    other = PlantModel(
+        plant.gain / time**plant.integrators,
+        tuple(Mode(mode.omega / time, mode.zeta) for mode in plant.zero_modes),
+        tuple(Mode(mode.omega / time, mode.zeta) for mode in plant.pole_modes),
+        plant.delay_s * time,
+        plant.integrators,
+        tuple(rate / time for rate in plant.real_zeros),
+        tuple(rate / time for rate in plant.real_poles),
+    )
+    slower = AdditiveBound.printed_form(bound.gain, bound.corner / time, 10.0 / time, 0.3)
+    own, theirs = (
+        design_extended(IdentifiedModel(*each), [omega]).free
+        for each, omega in (((plant, bound), 1.0), ((other, slower), 1.0 / time))
+    )
+    assert theirs.a * time == pytest.approx(own.a, rel=1e-9)
+    assert theirs.roll_off.order == own.roll_off.order
+    assert theirs.roll_off.rate * time == pytest.approx(own.roll_off.rate, rel=2e-3)
+
+
+def test_an_unstable_pole_is_held() -> None:
+    """T = 1 at the pole, and the loop has no root in the right half plane."""
+    plant = PlantModel(2.0, (), (), 0.05, 0, real_poles=(3.0, -1.0))
+    design = design_extended(IdentifiedModel(plant, bound_of(plant, 2.0, 0.005)), [0.5])
+    assert complex(design.blocks["T_so"](1.0) * design.blocks["T_si"](1.0)) == pytest.approx(1.0, rel=1e-12)
+    assert roots_right_of(delay_loop(design, plant), 0.0) == 0
+    run = simulate_design(design, math.inf, sinusoid(1.0, 0.5), None, until_s=14 / design.free.pace)
+    assert np.abs(run.outputs["error"][-100:]).max() < 1e-3
+
+
+def test_without_integral_action_where_the_model_is_not_known_at_rest() -> None:
+    """|W_a/P| is above the level at s = 0 alone: the sinusoid is followed, and the design says what it does without."""
+    plant = PlantModel(1.0, (), (Mode(30.0, 0.05),), 0.01, 0)
+    bound = AdditiveBound(0.8, (), (), (500.0,), (1.0, 2000.0))
+    design = design_extended(IdentifiedModel(plant, bound), [3.0])
+    assert any("no integral action" in reason for reason in design.free.reasons)
+    assert complex(design.blocks["T_so"](3j) * design.blocks["T_si"](3j)) == pytest.approx(1.0, rel=1e-9)
+    with pytest.raises(
+        InputError, match=r"\|W_a/P\| is 0.8 at 0 rad/s.*a level above that, or a frequency .*better known"
+    ):
+        design_extended(IdentifiedModel(plant, bound), [0.0, 3.0])
+
+
+@pytest.mark.parametrize(
+    ("plant", "omegas", "sentence"),
+    [
+        (PlantModel(1.0, (), (Mode(9.0, 0.1),), 0.01, -1), [0.0], r"zero\(s\) at s = 0, .* no bounded control holds"),
+        (PlantModel(1.0, (), (), 0.01), [], "none rad/s; expected one or more"),
+        (PlantModel(1.0, (), (), 0.01), [2.0, 2.0], "expected each once"),
+        (PlantModel(1.0, (), (), 0.01), [-2.0], "none negative"),
+    ],
+)
+def test_what_no_controller_follows_is_refused(plant: PlantModel, omegas: list[float], sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        design_extended(IdentifiedModel(plant, bound_of(plant, 2.0, 0.01)), omegas)
+
+
+def test_far_apart_frequencies_lose_nothing() -> None:
+    """Interpolation over six decades: a Vandermonde matrix in doubles would lose all its digits."""
+    wanted = tracking_conditions(PlantModel(1.0, (), (), 1e-3, 2, real_zeros=(-3e3,)), (1e-2, 1.0, 1e2, 1e4))
+    T_so = outer_part(wanted, (complex(-20.0),) * wanted.count + (complex(-500.0),) * 2)
+    for omega in wanted.omegas:
+        assert complex(T_so(1j * omega) * wanted.T_si(1j * omega)) == pytest.approx(1.0, abs=1e-7)
+
+
+def test_reasons_and_inner_factor_survive_the_file(design: Design, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    path = tmp_path / "design.json"
+    path.write_text(design.to_json())
+    again = read_design(path)
+    assert again.free.reasons == design.free.reasons != ()
+    assert again.controller_parts() == design.controller_parts()
+    changed = dataclasses.replace(again, plant=dataclasses.replace(again.plant, gain=again.plant.gain * 2))
+    assert changed.controller_parts()[1] == design.controller_parts()[1]
