@@ -123,9 +123,7 @@ class Design:
         """What the anti-windups of others are made of."""
         pole = self.parameters.a if isinstance(self.parameters, ExtendedParameters) else None
         recovery_s, bandwidth = self.corrected.judgement.recovery_s, self.corrected.bandwidth
-        return LinearLoop(
-            self.loop_plant, *self.controller_parts(), pole, self.reference_omegas, recovery_s, bandwidth
-        )
+        return LinearLoop(self.loop_plant, *self.controller_parts(), pole, self.reference_omegas, recovery_s, bandwidth)
 
     def controller_parts(self) -> tuple[Block, Block]:
         """The blocks of C = forward/(1 - feedback exp(-h s)) with h the plant's dead time, (3.10) and (3.31).

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from design.anti_windup.compensator import AntiWindup
+from design.anti_windup.compensator import AntiWindup, uncertainty_cost
 from design.anti_windup.other_anti_windups import OTHERS
 from design.design_file import Design
 from experiments.engine.simulate import Run, simulate
@@ -26,8 +26,6 @@ PULSE = 0.1  # of a period: how long the disturbance acts
 SAMPLES = 2000  # a period
 KEPT = 8  # of the samples every so many are written
 STEPS = 100  # of a period, of the physical limit
-
-UPSETS = ("start", "pulse")
 
 Tick = Callable[[], object]
 
@@ -52,16 +50,28 @@ def comparison_tables(
     -------
     dict
         ``compare``: for every anti-windup two rows. The upset ``start`` begins at rest, ``pulse`` four periods later:
-        there a disturbance as large as the limit is added to the plant's input, for a tenth of a period. Each counts
-        for four periods, and times count from its beginning. Columns: run, upset; refused, the sentence if there is no
-        such anti-windup for the design, the other cells being empty then; guarantee (``global``: whatever the control;
-        ``sector K``; ``none``); recovery_s, when \\|y - y0\\| has fallen to 1 % of the reference's amplitude for good, y0
-        being the output without saturation and under the same disturbance (empty: not within the four periods);
-        last_saturation_s (empty: saturated at their end); peak_error, the greatest \\|r - y\\| from from_s on, a quarter of
-        a period after the beginning; least_peak_error, a lower bound of it for every controller (of the start alone, and
-        of a periodic reference); largest_control over the limit; last_error, the greatest \\|r - y\\| of the last period;
-        crossings of the limits; limit and required.
-        ``compare_runs``: time_s, reference, and for every run NAME output_NAME and control_NAME; output_unsaturated.
+        a disturbance as large as the limit is added to the plant's input for a tenth of a period. Each counts for four
+        periods, and times count from its beginning.
+
+        run, upset, refused
+            The last is the sentence where the design has no such anti-windup; the cells after it are empty then.
+        guarantee, f
+            ``global``: whatever the control; ``sector K``; ``none``. ||W_a (1 + theta1~)||, (2.19); empty where
+            the anti-windup is not of this form.
+        recovery_s
+            When |y - y0| has fallen to 1 % of the reference's amplitude for good, y0 being the output without
+            saturation and under the same disturbance; empty: not within the four periods.
+        last_saturation_s, crossings
+            Of the limits; the first is empty where u is saturated at the end.
+        peak_error, from_s, least_peak_error
+            The greatest |r - y| from from_s on, a quarter of a period after the beginning, and what no controller
+            betters; the last for the start only, and for a periodic reference.
+        largest_control, last_error
+            The greatest |u| over the limit, and the greatest |r - y| of the last period.
+        limit, required
+            The latter is the most that the control of perfect tracking reaches.
+
+        ``compare_runs``: time_s, reference, output_unsaturated, and for every run NAME output_NAME and control_NAME.
 
     Raises
     ------
@@ -86,16 +96,17 @@ def comparison_tables(
         runs |= run_all({name: loop}, limit, time_s)
         tick()
     from_s, least = _least_error(design, reference, limit, period)
-    facts = {"limit": limit, "required": required}
     rows = []
     for name in ("none", *design.anti_windup, *OTHERS):
-        for upset in UPSETS:
-            row: dict[str, object] = {"run": name, "upset": upset, "refused": refused.get(name)}
+        known = {"limit": limit, "required": required, "refused": refused.get(name)}
+        if name in kinds:
+            known |= _promised(design, kinds[name])
+        for upset, start_s in (("start", 0.0), ("pulse", begin)):
+            row: dict[str, object] = {"run": name, "upset": upset} | known
             if name in runs:
-                start_s = 0.0 if upset == "start" else begin
                 row |= _row(runs[name], unsaturated, start_s, period, from_s, limit, SETTLED * reference.amplitude)
-                row |= {"least_peak_error": least if upset == "start" else np.nan, "guarantee": _said(design, kinds[name])}
-            rows.append(row | facts)
+                row |= {"least_peak_error": least if upset == "start" else np.nan}
+            rows.append(row)
     series = {"time_s": time_s, "reference": reference(time_s), "output_unsaturated": unsaturated}
     for name, run in runs.items():
         series |= {f"output_{name}": run.outputs["output"], f"control_{name}": run.control}
@@ -114,9 +125,12 @@ def anti_windups(design: Design) -> tuple[dict[str, AntiWindup | None], dict[str
     return found, refused
 
 
-def _said(design: Design, kind: AntiWindup | None) -> str:
+def _promised(design: Design, kind: AntiWindup | None) -> dict[str, object]:
     sector = guarantee(design, kind).sector
-    return "none" if sector == 0 else "global" if sector >= 1 else f"sector {sector_text(sector)}"
+    said = "none" if sector == 0 else "global" if sector >= 1 else f"sector {sector_text(sector)}"
+    if kind is None or not kind.theta1_tilde.is_stable:
+        return {"guarantee": said}
+    return {"guarantee": said, "f": uncertainty_cost(design.additive_bound, kind.one_plus)[0]}
 
 
 def _least_error(design: Design, reference: Reference, limit: float, period: float) -> tuple[float, float]:

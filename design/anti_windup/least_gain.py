@@ -11,7 +11,10 @@ which in Q, U, Q times c and b times U is linear. A dead time of P delays y_d, w
 
 from __future__ import annotations
 
+import contextlib
+import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,8 +27,33 @@ from identification.base.arrays import Real
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
+ROUNDING = 1e-6  # of the inequality's largest eigenvalue, by which the solver may miss it
+SPARE = 1e-3  # of the gain, with which the inequality has to hold
 
-def weston_postlethwaite(plant: PlantModel, bandwidth: float) -> AntiWindup:
+Shaped = Any
+"""A cvxpy expression or variable, which is imported only where it is solved for."""
+
+
+@dataclass(frozen=True)
+class LeastGain:
+    """What the inequality gave.
+
+    Parameters
+    ----------
+    kind
+        theta1~.
+    gain
+        gamma, in output units per input unit: what was found, to the solver's tolerance, not proved.
+    sector
+        k for which it holds.
+    """
+
+    kind: AntiWindup
+    gain: float
+    sector: float
+
+
+def weston_postlethwaite(plant: PlantModel, bandwidth: float) -> LeastGain:
     """P = N M^-1 with M = F (sI - A - b F)^-1 b + 1 of full order: the F whose gain is least.
 
     P. F. Weston and I. Postlethwaite, "Linear conditioning for systems containing saturating actuators", Automatica
@@ -56,12 +84,13 @@ def weston_postlethwaite(plant: PlantModel, bandwidth: float) -> AntiWindup:
     moved = A @ Q + b @ L
     radius = max(bandwidth, *map(abs, block.poles)) / unit
     disk = cp.bmat([[radius * Q, moved], [moved.T, radius * Q]]) >> 0
-    _solve(Q, U, moved, b @ U, -L, c @ Q, _sector(block), [disk])
+    k = _sector(block)
+    gain = _solve(Q, U, moved, b @ U, -L, c @ Q, k, [disk])
     F = np.linalg.solve(Q.value, L.value.T).T
-    return from_one_plus(Block(1.0, block.poles, _eigenvalues(A + b @ F, unit)))
+    return LeastGain(from_one_plus(Block(1.0, block.poles, _eigenvalues(A + b @ F, unit))), gain, k)
 
 
-def static(plant: PlantModel, g: Block, poles: Sequence[complex]) -> AntiWindup:
+def static(plant: PlantModel, g: Block, poles: Sequence[complex]) -> LeastGain:
     """A constant gain from u~ to the controller's states: M = g (1 - c (sI - A)^-1 f), f the gain of least L2 gain.
 
     E. F. Mulder, M. V. Kothare and M. Morari, "Multivariable anti-windup controller synthesis using linear matrix
@@ -100,8 +129,10 @@ def static(plant: PlantModel, g: Block, poles: Sequence[complex]) -> AntiWindup:
     full = np.block([[A_f, np.zeros((n, m))], [-b_g @ c_f, A_g]])
     Q, X, U = cp.Variable((n + m, n + m), symmetric=True), cp.Variable((n, 1)), cp.Variable((1, 1))
     theta1_tilde, y_d = np.hstack([-c_f, c_g[:1]]), np.hstack([np.zeros((1, n)), c_g[1:]])
-    _solve(Q, U, full @ Q, cp.vstack([X, b_g @ U]), -theta1_tilde @ Q, y_d @ Q, _sector(block), [])
-    return from_one_plus(g * Block(1.0, _eigenvalues(A_f + X.value @ c_f / U.value, unit), tuple(poles)))
+    k = _sector(block)
+    gain = _solve(Q, U, full @ Q, cp.vstack([X, b_g @ U]), -theta1_tilde @ Q, y_d @ Q, k, [])
+    zeros = _eigenvalues(A_f + X.value @ c_f / U.value, unit)
+    return LeastGain(from_one_plus(g * Block(1.0, zeros, tuple(poles))), gain, k)
 
 
 def _in_unit(system: StateSpace, unit: float) -> tuple[Real, Real, Real]:
@@ -117,12 +148,19 @@ def _eigenvalues(A: Real, unit: float) -> tuple[complex, ...]:
     return tuple(complex(root) * unit for root in np.linalg.eigvals(A))
 
 
-def _solve(Q: Any, U: Any, AQ: Any, bU: Any, minus_cQ: Any, y_dQ: Any, k: float, more: list[Any]) -> None:
-    """Give Q, U and the gain their values; raises InputError where the solver finds none."""
+def _solve(
+    Q: Shaped, U: Shaped, AQ: Shaped, bU: Shaped, minus_cQ: Shaped, y_dQ: Shaped, k: float, more: list[Shaped]
+) -> float:
+    """Give Q and U their values, and return the gain.
+
+    Raises
+    ------
+    InputError
+        The solver finds none, or what it finds does not meet the inequality.
+    """
     import cvxpy as cp
 
-    gain, one = cp.Variable((1, 1)), np.eye(1)
-    none = np.zeros((Q.shape[0], 1))
+    gain, one, none = cp.Variable((1, 1)), np.eye(1), np.zeros((Q.shape[0], 1))
     inequality = cp.bmat(
         [
             [AQ + AQ.T, bU + k * minus_cQ.T, none, y_dQ.T],
@@ -132,9 +170,15 @@ def _solve(Q: Any, U: Any, AQ: Any, bU: Any, minus_cQ: Any, y_dQ: Any, k: float,
         ]
     )
     problem = cp.Problem(cp.Minimize(gain[0, 0]), [inequality << 0, Q >> 0, *more])
-    try:
+    quiet = warnings.catch_warnings(action="ignore", category=UserWarning)  # of a solution that may be inaccurate
+    with quiet, contextlib.suppress(cp.SolverError):  # the status says either
         problem.solve(solver=cp.CLARABEL)
-    except cp.SolverError:
-        pass
-    if problem.status not in ("optimal", "optimal_inaccurate"):
+    if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
         raise InputError(f"the linear matrix inequality has no solution for the sector {k:g} ({problem.status})")
+    found = float(gain.value[0, 0])
+    gain.value = (1 + SPARE) * gain.value
+    size = np.sqrt(np.abs(np.diag(inequality.value)))
+    eigenvalues = np.linalg.eigvalsh(inequality.value / np.outer(size, size))
+    if not (eigenvalues[-1] <= ROUNDING * -eigenvalues[0] and np.linalg.eigvalsh(Q.value)[0] > 0):
+        raise InputError(f"the linear matrix inequality is not solved to rounding for the sector {k:g}")
+    return found

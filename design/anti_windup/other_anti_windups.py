@@ -1,16 +1,16 @@
 """The anti-windups that others published, for comparison: each as theta1~ and theta2 of the loop of Fig. 2.6.
 
-Any linear anti-windup adds H u~ to the control of C, u~ = u - sat(u). From u = C(r - P sat(u)) + H u~ follows
+A linear anti-windup adds H u~ to the control of C, u~ = u - sat(u). From u = C (r - P sat(u)) + H u~ follows
 
     u = v - theta1~ u~,   y = y_lin - P M u~,   M = 1 + theta1~ = S (1 - H),   S = 1/(1 + C P),
 
-v and y_lin being the control and the output of the loop without saturation. So each is a choice of M. Two keep no dead
-time in it although S = 1 - T_so T_si has one:
+v and y_lin being the control and the output of the loop without saturation. So each is a choice of M. In two of them
+there is no dead time, although S = 1 - T_so T_si has one:
 
-- conditioning, H = 1 - C/C(infinity): M = C S/C(infinity), which in chapters 3 and 4 is K/K(infinity);
-- the observer, v = E e + G sat(u) with C = E/(1 - G), E = K/g and 1 - G = (1 - T)/g, the two stable factors of
-  :mod:`design.chapters_3_4.realisation`: H = -G, so that M = g = prod(s - p_i)/(s + a)^q, p_i the plant's q poles with
-  Re s >= 0. For one integrator that is the washout s/(s + a). Without such poles it is the internal model.
+- conditioning, H = 1 - C/C(infinity), gives M = C S/C(infinity): in chapters 3 and 4 K/K(infinity);
+- the observer, u = E e + G sat(u) with C = E/(1 - G), has H = -G/(1 - G) and M = S/(1 - G). With the two stable factors
+  of :mod:`design.chapters_3_4.realisation`, 1 - G = (1 - T_so T_si)/g, that is g = prod(s - p_i)/(s + a)^q, p_i the
+  plant's q poles with Re s >= 0: for one integrator the washout s/(s + a), for none the internal model.
 """
 
 from __future__ import annotations
@@ -116,8 +116,8 @@ def internal_model(loop: LinearLoop) -> AntiWindup:
 
 def _static(loop: LinearLoop) -> AntiWindup:
     if loop.pole is not None:
-        return static(loop.plant, observer(loop).one_plus, loop.forward.poles)
-    return static(loop.plant, Block(1.0), _sensitivity(loop).poles)
+        return static(loop.plant, observer(loop).one_plus, loop.forward.poles).kind
+    return static(loop.plant, Block(1.0), _sensitivity(loop).poles).kind
 
 
 OTHERS: Mapping[str, Callable[[LinearLoop], AntiWindup]] = {
@@ -125,7 +125,7 @@ OTHERS: Mapping[str, Callable[[LinearLoop], AntiWindup]] = {
     "conditioning": conditioning,
     "observer": observer,
     "internal-model": internal_model,
-    "weston-postlethwaite": lambda loop: weston_postlethwaite(loop.plant, loop.bandwidth),
+    "weston-postlethwaite": lambda loop: weston_postlethwaite(loop.plant, loop.bandwidth).kind,
     "static": _static,
 }
 """By the names that ``--anti-windup`` takes; each raises InputError where it does not exist."""
