@@ -17,7 +17,7 @@ from design.blocks.inner_outer import inner_outer
 from design.hinf.mixed_sensitivity import Synthesis
 from design.parameters import DelayFreeParameters, ExtendedParameters
 from identification.base.errors import InputError, shown
-from identification.base.json_object import member, number, read_json
+from identification.base.json_object import member, number, read_json, texts
 from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
 from identification.model.plant_json import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
@@ -54,6 +54,8 @@ class Design:
         The anti-windups that every design carries.
     added
         Any others by their names.
+    compared
+        What each does beside none in one run, a sentence each, the one that does harm first; empty where none was run.
     """
 
     kind: str
@@ -66,6 +68,7 @@ class Design:
     thesis: PrintedCompensator
     corrected: CorrectedCompensator
     added: Mapping[str, Compensator] = field(default_factory=dict)
+    compared: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         omegas = ", ".join(f"{omega:.4g}" for omega in self.reference_omegas)
@@ -147,6 +150,7 @@ class Design:
             "blocks": {name: block.to_dict() for name, block in self.blocks.items()},
             "hinf": None if self.hinf is None else self.hinf.to_dict(),
             "anti_windup": {name: each.to_dict() for name, each in self.anti_windup.items()},
+            "compared": list(self.compared),
         }
         return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
@@ -187,6 +191,7 @@ def read_design(path: Path | str, kind: str | None = None) -> Design:
             thesis=PrintedCompensator.from_dict(_named(kinds, "thesis")),
             corrected=CorrectedCompensator.from_dict(_named(kinds, "corrected")),
             added={n: Compensator.from_dict(kinds[n]) for n in kinds if n not in ("thesis", "corrected")},
+            compared=texts(content, "compared") if "compared" in content else (),
         )
         if (hinf is not None) != delay_free:
             raise InputError(f"hinf belongs to a delay-free design and to no other; kind is '{design.kind}'")

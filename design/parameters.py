@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from identification.base.errors import InputError, shown
-from identification.base.json_object import member, number, numbers, record, whole, words
+from identification.base.json_object import member, number, numbers, record, texts, whole, words
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class ExtendedParameters:
             inverse_epsilon=number(content, "inverse_epsilon"),
             Q={name: _quotient(member(found, name)) for name in found},
             roll_off=_roll_off(content) if "robust_level" in content else None,
-            reasons=_sentences(content),
+            reasons=texts(content, "reasons") if "reasons" in content else (),
         )
 
 
@@ -144,13 +144,6 @@ def _pairs(content: Mapping[str, Any]) -> tuple[tuple[float, float], ...]:
     if not isinstance(given, list) or not all(isinstance(pair, list) and len(pair) == 2 for pair in given):
         raise InputError(f"'pairs' is {shown(given)}; expected a list of pairs of numbers")
     return tuple((number({"pairs": e}, "pairs"), number({"pairs": f}, "pairs")) for e, f in given)
-
-
-def _sentences(content: Mapping[str, Any]) -> tuple[str, ...]:
-    given = content.get("reasons", [])
-    if not isinstance(given, list) or not all(isinstance(sentence, str) for sentence in given):
-        raise InputError(f"'reasons' is {shown(given)}; expected a list of sentences")
-    return tuple(given)
 
 
 def _quotient(content: Mapping[str, Any]) -> Quotient | str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from experiments.pair_options import NumberPair
 from identification.base import path_types
 from identification.base.command_line import together
 from identification.base.errors import InputError
@@ -33,6 +34,52 @@ reference_options = together(
     ),
 )
 """Those, and ``--slope`` and ``--reference``."""
+
+
+LIMIT_PAIR = click.option(
+    "--limit",
+    type=NumberPair(),
+    metavar="[LOW] HIGH",
+    required=True,
+    help="Saturation limits in the actuator's unit, LOW < HIGH, or one number for +- that; inf for none.",
+)
+
+
+disturbance_options = together(
+    click.option(
+        "--input-disturbance",
+        type=NumberPair(),
+        metavar="LEVEL [AT_S]",
+        multiple=True,
+        help="From AT_S seconds on (0 unless given) LEVEL is added to the actuator's output, in its unit; repeatable.",
+    ),
+    click.option(
+        "--output-disturbance",
+        type=NumberPair(),
+        metavar="LEVEL [AT_S]",
+        multiple=True,
+        help="The same at the plant's output, in the reference's unit.",
+    ),
+    click.option(
+        "--noise",
+        type=(float, float),
+        metavar="STD RATE",
+        help="Adds to what is measured straight lines between RATE normal samples a second, in the reference's unit.",
+    ),
+    click.option("--seed", type=int, help="Of the noise."),
+)
+"""``--input-disturbance``, ``--output-disturbance``, ``--noise`` and ``--seed``."""
+
+
+def asked_limits(limit: tuple[float, ...]) -> tuple[float, float]:
+    """The limits that :data:`LIMIT_PAIR` asks for; raises InputError when they are not in order."""
+    if len(limit) == 2:
+        low, high = limit
+        if not low < high:
+            raise InputError(f"--limit is {low:g} {high:g}; expected the lower limit first")
+        return low, high
+    positive_limit(limit[0])
+    return -limit[0], limit[0]
 
 
 def positive_limit(limit: float | None) -> float | None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
-from experiments.options import DESIGN, positive_limit, reference_options
+from experiments.options import DESIGN, LIMIT_PAIR, asked_limits, disturbance_options, reference_options
+from experiments.pair_options import PairCommand
 from experiments.tables import write_tables
 from identification.base.command_line import together
 from identification.base.errors import InputError
@@ -16,14 +18,16 @@ from identification.base.files import require_writable
 from identification.base.path_types import OUTPUT_FILE
 
 MOST_ROWS = 1e7
+UNJUDGED = "Whether the guarantee covers the run is not judged under disturbances"
 SHARE = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"  # of a run, in a bar
 
 _run_options = together(
     DESIGN,
-    click.option("--limit", type=float, required=True, help="Saturation limits +-LIMIT; inf for none."),
+    LIMIT_PAIR,
     click.option("--anti-windup", required=True, help="none, thesis, corrected, or another of DESIGN."),
     click.option("--until", type=float, required=True, help="Length of the run in seconds."),
     reference_options,
+    disturbance_options,
     click.option(
         "--plant", help="The true plant: a model.json, table or implied; the design's own model unless given."
     ),
@@ -31,26 +35,37 @@ _run_options = together(
 )
 
 
-@click.command("simulate")
+@click.command("simulate", cls=PairCommand)
 @_run_options
 @click.option("--sample-time", type=float, required=True, help="Distance of the output's rows in seconds.")
+@click.option(
+    "--rate-limit",
+    type=float,
+    default=math.inf,
+    help="Most change of the actuator in a second, in its unit, unknown to the controller; inf by default.",
+)
 @click.option("--alpha", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
 @click.option("--beta", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
 @click.option("--gamma", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
 def simulate_command(
     design: Path,
-    limit: float,
+    limit: tuple[float, ...],
     anti_windup: str,
     until: float,
     sample_time: float,
+    rate_limit: float,
     alpha: float | None,
     beta: float | None,
     gamma: float | None,
     plant: str | None,
+    input_disturbance: Sequence[tuple[float, ...]],
+    output_disturbance: Sequence[tuple[float, ...]],
+    noise: tuple[float, float] | None,
+    seed: int | None,
     output: Path,
     **reference: Any,
 ) -> None:
-    """Run DESIGN from rest: time_s, reference, output, error, control, saturated_control."""
+    """Run DESIGN from rest: time_s, reference, output, error, control, saturated_control; with noise measured."""
     import numpy as np
     import pandas as pd
     from tqdm import tqdm
@@ -58,14 +73,16 @@ def simulate_command(
     from design.anti_windup.compensator import second_order
     from design.asked_model import asked_model
     from design.design_file import read_design
+    from experiments.asked_disturbances import disturbances_of
     from experiments.asked_reference import reference_of
     from experiments.engine.simulate import simulate
     from experiments.runs.design_loop import design_loop
+    from experiments.runs.disturbances import UNDISTURBED
     from experiments.runs.guarantee import guarantee
     from experiments.runs.metrics import last_saturation
     from experiments.runs.sector_promise import judge_run
 
-    positive_limit(limit)
+    limits = asked_limits(limit)
     if not 0 < sample_time <= until < math.inf:
         raise InputError(
             f"--until is {until:g} and --sample-time {sample_time:g}; expected 0 < sample time <= until, both finite"
@@ -83,11 +100,12 @@ def simulate_command(
         kind = second_order(**{"alpha": thesis.alpha, "beta": thesis.beta, "gamma": thesis.gamma} | numbers)
     # the quotient of two decimals may come out a rounding below a whole number
     time_s = sample_time * np.arange(int(until / sample_time * (1 + 1e-12)) + 1)
-    limits, asked = (-limit, limit), reference_of(content, **reference)
+    asked = reference_of(content, **reference)
+    disturbances = disturbances_of(until, input_disturbance, output_disturbance, noise, seed)
     true = None if plant is None else asked_model(plant).plant
-    loop = design_loop(content, asked, kind, true)
+    loop = design_loop(content, asked, kind, true, disturbances)
     with tqdm(total=until, desc="simulate", bar_format=SHARE, disable=None, leave=False) as bar:
-        run = simulate(loop, limits, time_s, bar.update)
+        run = simulate(loop, limits, time_s, bar.update, rate_limit)
     table = pd.DataFrame(
         {
             "time_s": run.time_s,
@@ -97,29 +115,49 @@ def simulate_command(
             "control": run.control,
             "saturated_control": run.saturated_control,
         }
+        | ({"measured": run.outputs["measured"]} if noise else {})
     )
     promised = ""
-    if kind is not None:
+    if kind is not None and disturbances != UNDISTURBED:
+        promised = UNJUDGED
+    elif kind is not None and np.any(np.abs(run.modes) > 1):
+        promised = "No guarantee: the actuator was too slow for the control, and a guarantee is of limits alone"
+    elif kind is not None:
         given = guarantee(content, kind, true)
         promised = str(judge_run(given, loop, limits, run, asked, true or content.loop_plant))
     write_tables({output: table}, inputs)
     saturated = last_saturation(run)
-    said = "saturated to the end" if np.isnan(saturated) else f"last saturated at {saturated:.6g} s"
+    beyond, crossings = ("saturated", "crossings of the limits")
+    if math.isfinite(rate_limit):
+        beyond, crossings = ("saturated or slewing", "beginnings and ends of saturation or slewing")
+    said = f"{beyond} to the end" if np.isnan(saturated) else f"last {beyond} at {saturated:.6g} s"
     if not len(run.events_s) and not np.isnan(saturated):
-        said = "never saturated"
-    click.echo(_first(promised, f"{len(table)} rows -> {output}; {len(run.events_s)} crossings of the limits, {said}"))
+        said = f"never {beyond}"
+    click.echo(_first(promised, f"{len(table)} rows -> {output}; {len(run.events_s)} {crossings}, {said}"))
 
 
-@click.command("sampled")
+@click.command("sampled", cls=PairCommand)
 @_run_options
 @click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
 @click.option("--method", required=True, help="How its blocks are discretised, tustin or exact.")
 @click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels; 0, no levels, by default.")
 @click.option("--slew", type=float, default=math.inf, help="Most change of the actuator in a second; inf by default.")
 @click.option("--input-delay", type=float, default=0.0, help="From sample to actuator in seconds; 0 by default.")
+@click.option(
+    "--form",
+    default="coprime",
+    show_default=True,
+    help="How the controller is realised: coprime, without hidden modes, or thesis, as drawn in Fig. 2.6.",
+)
+@click.option(
+    "--resolution",
+    type=float,
+    default=0.0,
+    help="Of the computer's own numbers, in the actuator's unit; 0, as fine as doubles, by default.",
+)
 def sampled_command(
     design: Path,
-    limit: float,
+    limit: tuple[float, ...],
     anti_windup: str,
     until: float,
     rate: float,
@@ -127,7 +165,13 @@ def sampled_command(
     quantum: float,
     slew: float,
     input_delay: float,
+    form: str,
+    resolution: float,
     plant: str | None,
+    input_disturbance: Sequence[tuple[float, ...]],
+    output_disturbance: Sequence[tuple[float, ...]],
+    noise: tuple[float, float] | None,
+    seed: int | None,
     output: Path,
     **reference: Any,
 ) -> None:
@@ -135,38 +179,43 @@ def sampled_command(
 
     Of these, control is what the computer asks for, and saturated_control what the actuator gives out.
     """
-    import numpy as np
     import pandas as pd
     from tqdm import tqdm
 
     from design.asked_model import asked_model
     from design.design_file import read_design
+    from experiments.asked_disturbances import disturbances_of
     from experiments.asked_reference import reference_of
     from experiments.drive.sampled_loop import Drive, simulate_sampled
+    from experiments.runs.disturbances import UNDISTURBED
     from experiments.runs.guarantee import guarantee
     from experiments.runs.sector_promise import steady_control, verdict
 
-    positive_limit(limit)
-    drive = Drive(rate, method, (-limit, limit), quantum, slew, input_delay)
+    drive = Drive(rate, method, asked_limits(limit), quantum, slew, input_delay, resolution)
     _require_few_rows(until * rate)
     inputs = _inputs(design, plant, reference["reference"])
     require_writable(output, inputs=inputs)
     content = read_design(design)
     kind = content.chosen(anti_windup)
     asked = reference_of(content, **reference)
+    disturbances = disturbances_of(until, input_disturbance, output_disturbance, noise, seed)
     true = None if plant is None else asked_model(plant).plant
     with tqdm(total=until * rate, desc="sampled", bar_format=SHARE, disable=None, leave=False) as bar:
-        run = simulate_sampled(content, asked, kind, drive, until, true, bar.update)
-    beyond = run.time_s[np.abs(run.control) > limit]
+        run = simulate_sampled(content, asked, kind, drive, until, true, bar.update, disturbances, form)
+    low, high = drive.limits
+    beyond = run.time_s[(run.control < low) | (run.control > high)]
     last = f", the last at {beyond[-1]:.6g} s" if len(beyond) else ""
     promised = ""
-    if kind is not None and len(beyond):
+    if kind is not None and len(beyond) and disturbances != UNDISTURBED:
+        promised = UNJUDGED
+    elif kind is not None and len(beyond):
         steady = steady_control(asked, true or content.loop_plant, run.time_s)
         found = verdict(guarantee(content, kind, true), run.time_s, run.control, steady, drive.limits)
         promised = str(found)
         if found.covered:
             promised = f"Within the guarantee of continuous time, which knows no computer and no drive: {found.needs}"
-    write_tables({output: pd.DataFrame(vars(run))}, inputs)
+    columns = {name: values for name, values in vars(run).items() if values is not None}
+    write_tables({output: pd.DataFrame(columns)}, inputs)
     click.echo(_first(promised, f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}"))
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from design.auditing.audit_design import Audit
-from design.blocks.block import bound_block
+from design.blocks.block import bound_block, plant_block
 from design.design_file import Design
 from design.hinf.mixed_sensitivity import Infimum, Synthesis
 from design.stability.margins import Margins
@@ -42,13 +42,15 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
         moved = _roots(roots[~hidden]) or f"none right of {found.roots.line:.4g} 1/s, where rounding hides them"
         lines.append(f"  rightmost characteristic roots  {moved}")
         lines.append(f"  cancelled between the blocks    {_roots(roots[hidden]) or 'none'}")
+    lines += _form_lines(design)
     lines += _margin_lines(found.margins)
     lines.append(
         f"  |W_a/P| at the reference        {found.tracking_floor:.4g}: no controller that follows it has a smaller "
         "peak"
     )
     covered = _covered(found.covered_delay_s)
-    lines.append(f"  within W_a                      {covered}; no other gain of the integrator")
+    gain = "; no other gain of the integrator" if design.plant.integrators > 0 else ""
+    lines.append(f"  within W_a                      {covered}{gain}")
     if found.same_controller is not None:
         lines.append(f"  C_aw = C_s                      to {found.same_controller:.1g}")
     if found.with_delay is not None:
@@ -72,9 +74,34 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
     return "\n".join(lines)
 
 
+def _form_lines(design: Design) -> list[str]:
+    """The modes in Re s >= 0 that each form of the controller hides inside, and what they do."""
+    anchors = plant_block(design.plant).unstable_poles
+    if design.hinf is not None or not anchors:
+        return []
+    fastest = max(anchor.real for anchor in anchors)
+    integral = "integral" if len(anchors) == 1 else "double integral"
+    moves = f"y grows like exp({fastest:.4g} t)" if fastest > 0 else f"y drifts as the {integral} of it"
+    return [
+        f"  hidden as drawn in Fig. 2.6     {_roots(np.array(anchors))}: what is rounded inside the controller, or a "
+        f"state that does not start at rest, stays: {moves}",
+        "  hidden as a computer runs it    none in Re s >= 0 (sampled; --form thesis runs the drawn form)",
+    ]
+
+
 def _plant_in_words(plant: PlantModel) -> str:
-    zeros, poles = len(plant.zero_modes), len(plant.pole_modes)
-    return f"plant of gain {plant.gain:g}, {zeros} zero and {poles} pole modes, dead time {_time(plant.delay_s, 0.0)}"
+    """Its gain, the roots at s = 0 where they are not the thesis's one integrator, its modes and real roots."""
+    zeros, poles, at_zero = len(plant.zero_modes), len(plant.pole_modes), plant.integrators
+    parts = [f"gain {plant.gain:g}"]
+    if at_zero != 1:
+        parts.append(f"{at_zero} integrators" if at_zero >= 0 else f"{-at_zero} zeros at s = 0")
+    parts.append(f"{zeros} zero and {poles} pole modes")
+    parts += [
+        f"{kind} at {', '.join(f'{-rate:.4g}' for rate in rates)} rad/s"
+        for kind, rates in (("real zeros", plant.real_zeros), ("real poles", plant.real_poles))
+        if rates
+    ]
+    return f"plant of {', '.join(parts)}, dead time {_time(plant.delay_s, 0.0)}"
 
 
 def _hinf_lines(stabiliser: Synthesis | str, infimum: Infimum | str) -> Iterable[str]:

@@ -25,6 +25,9 @@ class DelayLoop:
         K and T_so of chapters 3 and 4, Thesis Eq. (3.31); C and 0 in chapter 2. Without dead time.
     delay_s
         The dead time in seconds inside the controller.
+    held
+        Poles of the plant that the controller holds though K is zero there, see
+        :mod:`design.chapters_3_4.realisation`: they are not hidden.
 
     Raises InputError for a dead time where none belongs, an improper forward, or an algebraic loop.
 
@@ -42,6 +45,7 @@ class DelayLoop:
     forward: Block
     feedback: Block
     delay_s: float
+    held: tuple[complex, ...] = ()
 
     def __post_init__(self) -> None:
         if self.forward.delay_s or self.feedback.delay_s or not 0 <= self.delay_s < np.inf:
@@ -91,6 +95,6 @@ class DelayLoop:
     def hidden(self) -> tuple[complex, ...]:
         """The hidden roots, exactly, with their multiplicities."""
         roots = list(self.plant.poles + self.forward.poles + self.feedback.poles)
-        for root in self.denominator.zeros:
+        for root in (*self.denominator.zeros, *self.held):
             roots.remove(root)
         return tuple(roots)

@@ -111,10 +111,12 @@ def delay_loop(design: Design, plant: PlantModel) -> DelayLoop:
     is among them, so that y drifts. Chapters 3 and 4, K = s T_so A/(s B), hide every pole of the plant, every zero
     (the control rings with it) and the poles of T_so. There s = 0 is seen neither from the reference nor from the
     plant's input, as 1 - T_so exp(-T_d s) is zero there twice; but in the controller as drawn a disturbance of its
-    inner loop, or initial states of K or T_so, leave a constant offset in y for ever.
+    inner loop, or initial states of K or T_so, leave a constant offset in y for ever. A pole in the open right half
+    plane must not be hidden: the controller runs in the form of :mod:`design.chapters_3_4.realisation`, which holds it.
     """
     forward, feedback = design.controller_parts()
-    return DelayLoop(plant_block(plant), forward, feedback, design.loop_plant.delay_s)
+    held = design.plant.unstable_poles if plant.unstable_poles == design.plant.unstable_poles else ()
+    return DelayLoop(plant_block(plant), forward, feedback, design.loop_plant.delay_s, held)
 
 
 def margins_of(loop: DelayLoop, bound: AdditiveBound) -> Margins:

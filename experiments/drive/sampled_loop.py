@@ -10,13 +10,14 @@ import numpy as np
 
 from design.anti_windup.compensator import AntiWindup
 from design.blocks.block import Block, plant_block
-from design.blocks.state_space import realize
+from design.blocks.state_space import block_diagonal, realize
 from design.chapters_3_4.realisation import realised
 from design.design_file import Asked, Design
 from experiments.drive.compiled_steps import Actuator, Series, run
 from experiments.drive.difference_equations import METHODS, SampledBlock, sample_block, sample_memory, split
 from experiments.engine.simulate import MOST_STEPS, DivergenceError, limit_pair
 from experiments.engine.watched import Tick, watched
+from experiments.runs.disturbances import UNDISTURBED, Disturbances, Signal
 from experiments.runs.references import Reference, SampledReference
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
@@ -66,8 +67,6 @@ class Drive:
             raise InputError(f"the rate is {self.rate_hz:g} Hz; expected a positive number")
         if self.method not in METHODS:
             raise InputError(f"the method is '{self.method}'; expected {' or '.join(METHODS)}")
-        if not low < high:
-            raise InputError(f"the saturation limits are {low:g} and {high:g}; expected the lower one first")
         if not 0 <= self.quantum < math.inf:
             raise InputError(f"the quantum is {self.quantum:g}; expected a number that is not negative, 0 for none")
         if not self.slew > 0:
@@ -110,6 +109,8 @@ class SampledRun:
         u, which the computer finds from these samples and holds, before saturation, shape (s,).
     saturated_control
         What the actuator gives out at t_k (just after it, where it jumps): u saturated, rounded, late and slewing.
+    measured
+        y with the measurement noise, shape (s,); None without noise.
     """
 
     time_s: np.ndarray
@@ -118,6 +119,7 @@ class SampledRun:
     error: np.ndarray
     control: np.ndarray
     saturated_control: np.ndarray
+    measured: np.ndarray | None = None
 
     def __repr__(self) -> str:
         return f"SampledRun({self.time_s.size} samples up to {self.time_s[-1]:.6g} s)"
@@ -136,6 +138,7 @@ def simulate_sampled(
     until_s: float,
     plant: PlantModel | None = None,
     tick: Tick | None = None,
+    disturbances: Disturbances = UNDISTURBED,
     form: str = FORMS[0],
 ) -> SampledRun:
     """Run a design from rest with its controller on a computer.
@@ -150,6 +153,9 @@ def simulate_sampled(
         Length of the run in seconds, one sample at least.
     tick
         Called some times a second with the number of samples done since the last call.
+    disturbances
+        At the plant's input, between the actuator and the plant's dead time, at its output, and noise, all of
+        continuous time; the computer's samples hold what the last two are at the sampling instants.
     form
         ``coprime``, the realisation without hidden modes of :mod:`design.chapters_3_4.realisation`, or ``thesis``, K
         and T_so as drawn in Fig. 2.6.
@@ -164,7 +170,7 @@ def simulate_sampled(
 
     Notes
     -----
-    At t_k the computer samples r and y, no filter before it, and solves the equations of
+    At t_k the computer samples r and y, noise and all, no filter before it, and solves the equations of
     :func:`experiments.runs.design_loop.design_loop` with each block replaced by its difference equation. It knows the
     limits, but neither the rounding nor the slewing: u_tilde = u - sat(u). By Tustin's rule theta1~ has a direct part
     (and so has theta2 where its dead time is below one sample), so that
@@ -180,33 +186,47 @@ def simulate_sampled(
         raise InputError(
             f"the run lasts {until_s:g} s; expected a finite time of one sample, {1 / drive.rate_hz:g} s, at least"
         )
-    series = _series(design.loop_plant if plant is None else plant, drive, until_s)
+    series = _series(design.loop_plant if plant is None else plant, drive, until_s, disturbances.input)
     controller = _controller(design, design.chosen(anti_windup), drive, form)
     time_s = instants(drive.rate_hz, until_s)
-    r = reference(time_s)
+    r, output, noise = reference(time_s), disturbances.output, disturbances.noise
+    seen = r - disturbances.seen(time_s)
     y, u, command, start, reached = watched(
-        partial(run, *controller, drive.resolution, series, drive.actuator, 1 / drive.rate_hz, r), tick
+        partial(run, *controller, drive.resolution, series, drive.actuator, 1 / drive.rate_hz, seen), tick
     )
     if reached < len(r):
         raise DivergenceError(float(time_s[reached]))
-    return SampledRun(time_s, r, y, r - y, u, _actuator(drive, command, start))
+    y = y + output(time_s) if output else y
+    return SampledRun(time_s, r, y, r - y, u, _actuator(drive, command, start), y + noise(time_s) if noise else None)
 
 
-def _series(plant: PlantModel, drive: Drive, until_s: float) -> Series:
+def _series(plant: PlantModel, drive: Drive, until_s: float, disturbance: Signal | None) -> Series:
     """The plant as the run carries it, its dead time and the drive's in whole samples and a rest."""
     if plant.relative_degree < 1:
         raise InputError("the true plant has as many zeros as poles; expected more poles, or the loop is algebraic")
     T = 1 / drive.rate_hz
     P = realize(plant_block(plant))
-    norm = float(np.abs(np.column_stack([P.A, P.b])).sum(axis=1).max())  # of one second
+    A, b, c = P.A, P.b, P.C[0]
+    knots, pieces = np.zeros(0), np.zeros((0, 0))
+    if disturbance is not None:
+        source = disturbance.generator()
+        g, n = len(source.start), len(b)
+        A, b, c = block_diagonal(A, source.matrix), np.pad(b, (0, g)), np.pad(c, (0, g))
+        A[:n, n:] = np.outer(P.b, source.row)
+        knots = np.append(0.0, source.resets.times_s)
+        pieces = np.vstack([source.start, source.resets.values.reshape(-1, g)])
+    norm = float(np.abs(np.column_stack([A, b])).sum(axis=1).max())  # of one second
     steps = until_s * drive.rate_hz * math.ceil(norm * T)
     if steps > MOST_STEPS:
         raise InputError(
             f"the run needs {steps:.3g} steps, set by its rate and the plant's fastest pole; expected at most "
             f"{MOST_STEPS:.3g} (a shorter run)"
         )
-    whole, rest = split(min(drive.input_delay_s + plant.delay_s, until_s + 2 * T), T)  # beyond the run is beyond
-    return Series(P.A, P.b, P.C[0], norm, whole, (1 - rest) * T)
+    late_s = min(drive.input_delay_s + plant.delay_s, until_s + 2 * T)  # beyond the run is beyond
+    whole, rest = split(late_s, T)
+    ahead_s = late_s - plant.delay_s  # of the plant's own time, in which commands are not late
+    early = max(math.ceil(ahead_s / T - SPARE), 0) if len(knots) else 0
+    return Series(A, b, c, norm, whole, (1 - rest) * T, knots - ahead_s, pieces, early)
 
 
 def _controller(

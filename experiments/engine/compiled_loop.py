@@ -24,8 +24,11 @@ class CompiledLoop(NamedTuple):
         [Z 0 0], and o rows [. 0 0] of what is watched.
     saturated
         The same with n rows [A B D].
+    slewing, stopped
+        The same of an actuator with a rate limit while it slews, u between the limits and beyond: the last two states
+        are the rate and the actuator's output, and the constant is sat(u). Otherwise not used.
     tables
-        Of the two, see :class:`experiments.engine.step_table.Tables`, for the signals u, Z x and what is watched.
+        Of these, see :class:`experiments.engine.step_table.Tables`, for the signals u, Z x and what is watched.
     delays, brief, x0
         Shapes (k,), (k,), (n,); delays positive. Where ``brief``, the loop is that with a dead time of zero, and w_j
         stands for what the dead time changes, Z_j x(t - h_j) - Z_j x(t).
@@ -40,6 +43,8 @@ class CompiledLoop(NamedTuple):
 
     unsaturated: Rows
     saturated: Rows
+    slewing: Rows
+    stopped: Rows
     tables: Tables
     delays: np.ndarray
     brief: np.ndarray
@@ -51,7 +56,11 @@ class CompiledLoop(NamedTuple):
 
 
 def compile_loop(
-    loop: SaturatedLoop, most_step: float = np.inf, most_brief: float = BRIEF, idle_step: float = 1.0
+    loop: SaturatedLoop,
+    most_step: float = np.inf,
+    most_brief: float = BRIEF,
+    idle_step: float = 1.0,
+    slews: bool = False,
 ) -> CompiledLoop:
     """Merge the delayed signals that enter the loop alike, choose the step, and tabulate it.
 
@@ -59,6 +68,7 @@ def compile_loop(
     brief, of which it is a whole part: then most delayed polynomials are read where they start. It is halved until all
     series end. A dead time is brief up to ``most_brief`` time constants of the fastest eigenvalue: the loop is taken
     without it, and what it changes is found in each step. Where nothing sets a step, ``idle_step`` seconds are one.
+    ``slews`` says that the last two states are those of an actuator with a rate limit.
     """
     now = loop.delays == 0
     A, C = loop.A + loop.D[:, now] @ loop.Z[now], loop.C + loop.E[now] @ loop.Z[now]
@@ -73,6 +83,13 @@ def compile_loop(
     read = [np.concatenate([C, [0.0], E]), *np.hstack([states, np.zeros((len(states), 1 + k))])]
     unsaturated = compressed(np.vstack([np.hstack([free_A, np.zeros((n, 1)), free_D]), *read]))
     saturated = compressed(np.vstack([np.hstack([A, loop.B[:, None], D]), *read]))
+    modes = [unsaturated, saturated]
+    if slews:
+        m, knows = np.eye(n)[-1], np.zeros(n) if loop.B_limits is None else loop.B_limits
+        moved = A + np.outer(loop.B - knows, m) + np.outer(m, np.eye(n)[-2])
+        free_A, free_D = moved + np.outer(knows, C), D + np.outer(knows, E)
+        modes.append(compressed(np.vstack([np.hstack([free_A, np.zeros((n, 1)), free_D]), *read])))
+        modes.append(compressed(np.vstack([np.hstack([moved, knows[:, None], D]), *read])))
 
     fastest = _fastest(A, loop.B, C)
     step = min(FURTHEST / fastest if fastest > 0 else np.inf, most_step)
@@ -82,14 +99,16 @@ def compile_loop(
     elif np.isinf(step):
         step = idle_step  # of integrators alone, whose series end by themselves
     while True:
-        both = [tabulate(rows, n, k, step) for rows in (unsaturated, saturated)]
-        if all(degree >= 0 for _, degree in both):
+        tabulated = [tabulate(rows, n, k, step) for rows in modes]
+        if all(degree >= 0 for _, degree in tabulated):
             break
         step /= 2
     return CompiledLoop(
         unsaturated=unsaturated,
         saturated=saturated,
-        tables=Tables(*(_stacked(pair) for pair in zip(*(tables for tables, _ in both), strict=True))),
+        slewing=modes[-2],
+        stopped=modes[-1],
+        tables=Tables(*(_stacked(alike) for alike in zip(*(tables for tables, _ in tabulated), strict=True))),
         delays=delays,
         brief=brief,
         x0=loop.x0,

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.engine.compiled_loop import CompiledLoop
-from experiments.engine.crossings import leaves_mode
 from experiments.engine.kinks import BEYOND, Past, drop, images, shift
 from experiments.engine.signals import change, driven, expand, fill, unfold
+from experiments.engine.slewing import direction, leaves_actuator_mode, place
 from experiments.engine.step_table import NEGLIGIBLE, NOTHING, advance, dot, times, whole_lanes
 from experiments.engine.watched import REACHED, STOP
 from identification.base.arrays import Array
@@ -40,9 +40,9 @@ class Bounds(NamedTuple):
 
 @njit(nogil=True)
 def integrate(
-    loop: CompiledLoop, reset_times: Array, resets: Array, low: float, high: float, samples: Array, horizon: float,
-    bounds: Bounds, watch: Array,
-) -> tuple[Array, Array, Array, int, float, int, float]:  # fmt: skip
+    loop: CompiledLoop, reset_times: Array, resets: Array, low: float, high: float, rate: float, samples: Array,
+    horizon: float, bounds: Bounds, watch: Array,
+) -> tuple[Array, Array, Array, Array, int, float, int, float]:  # fmt: skip
     """Integrate one loop from rest of its delayed signals, w_j(t < 0) = Z_j x0.
 
     Parameters
@@ -50,9 +50,10 @@ def integrate(
     loop
         Its equations as tables.
     reset_times, resets
-        Shapes (b,), (b, g): times at which the first g states take given values.
-    low, high
-        Saturation limits, may be infinite.
+        Shapes (b,), (b, g): times at which the first g states take given values; where NaN, none.
+    low, high, rate
+        Saturation limits and the most that m changes in a second, may be infinite; with a rate the last two states
+        are m' while m slews, and m.
     samples
         Shape (g, s): each group of what is watched is sampled at the sorted times samples[i] <= horizon; before zero
         it is as at zero. u is sampled with the first group.
@@ -65,14 +66,14 @@ def integrate(
 
     Returns
     -------
-    values (1 + o, s), events (e,), modes (e,), status, end, steps, tail
-        u and what is watched at the samples; event times with the mode entered (-1, 0, 1); COMPLETE, DIVERGED,
-        ENDLESS (too many steps), CROWDED (too little room), EVENTFUL, UNSETTLED (a brief dead time is too long) or
-        STOPPED;
-        the time reached; the number of steps; the largest last term of a signal's polynomial, as a share of the
-        largest that the signal was.
+    values (1 + o, s), events (e,), modes (e,), places (e,), status, end, steps, tail
+        u and what is watched at the samples; event times with the mode entered (:mod:`experiments.engine.slewing`)
+        and m there; COMPLETE, DIVERGED, ENDLESS (too many steps), CROWDED (too little room), EVENTFUL, UNSETTLED (a
+        brief dead time is too long) or STOPPED; the time reached; the number of steps; the largest last term of a
+        signal's polynomial, as a share of the largest that the signal was.
     """
-    unsaturated, saturated, tables, delays, brief, x0, step, groups, _, _ = loop
+    unsaturated, saturated, slewing, stopped, tables, delays, brief, x0, step, groups, _, _ = loop
+    slews, slope = rate < np.inf, rate * step
     n, k, room = len(x0), len(delays), bounds.room
     limit = max(abs(low) if np.isfinite(low) else 0.0, abs(high) if np.isfinite(high) else 0.0)
     most_u, most_x = (DIVERGENT * limit, ENORMOUS) if limit > 0 else (np.inf, DIVERGENT)
@@ -82,6 +83,7 @@ def integrate(
     most = polynomials.shape[1] // signals - 1
     values, sample = np.zeros((signals - k, samples.shape[1])), np.zeros(len(samples), np.int64)
     events, modes, event_count = np.empty(bounds.events), np.empty(bounds.events, np.int64), 0
+    places = np.empty(bounds.events)
 
     # the sources of the delayed signals, one polynomial a step, the step p at p % room, and where each dead time reads
     starts, lates, radii, degrees, pieces = np.empty(room), np.empty(room), np.empty(room), np.empty(room, np.int64), 0
@@ -105,8 +107,8 @@ def integrate(
     last = np.zeros(1 + k)
     seen = np.zeros(signals - 1 - k)  # of what is watched
     u = times(indptr, indices, data, n, V, 0)
-    mode = 1 if u > high else (-1 if u < low else 0)
-    kink, on_limit, standing = True, 0, 0
+    mode = 0 if slews else (1 if u > high else (-1 if u < low else 0))
+    kink, on_limit, roots, standing = True, 0, 0, 0
     for g in range(len(samples)):
         while sample[g] < samples.shape[1] and samples[g, sample[g]] < 0:
             for o in range(groups[g], groups[g + 1]):
@@ -165,10 +167,14 @@ def integrate(
             filled[j] = fill(z, n, k, j, W, degree, min(1.0, (t_next - t) / step + BEYOND), NEGLIGIBLE * size[1 + j])
             known = max(known, filled[j])
 
-        which = 0 if mode == 0 else 1
+        side = direction(mode)
+        beyond = mode - 3 * side  # which limit u is
+        which = abs(beyond) + 2 * abs(side)
+        if slews:
+            x[n - 2] = side * rate
         for r in range(n):
             z[r] = x[r]
-        z[n] = 0.0 if mode == 0 else (high if mode == 1 else low)
+        z[n] = 0.0 if beyond == 0 else (high if beyond == 1 else low)
         radius = min(1.0, (t_next - t) / step + BEYOND)
         degree, power = unfold(tables, which, k, z, sizes, known, radius, usual, size, negligible, P, terms)
         for trial in range(TRIALS if some_brief else 0):
@@ -197,7 +203,9 @@ def integrate(
         if reset < len(reset_times) and t_next == reset_times[reset]:
             whole = False  # it ends there to the last digit
         reach = 1.0 if whole else max((t_next - t - late) / step, 0.0)
-        exit_at, entered, crossed = leaves_mode(U, degree, mode, on_limit, standing > 2, low, high, reach)
+        exit_at, entered, crossed, left = leaves_actuator_mode(
+            U, degree, mode, on_limit, roots, standing > 2, low, high, reach, x[n - 1], slope, size[0]
+        )
         late_next = 0.0
         if exit_at >= 0 or whole:
             reach = exit_at if exit_at >= 0 else 1.0
@@ -241,6 +249,7 @@ def integrate(
                         value = value * tau + W[i]
                     values[1 + o, at] = value
 
+        m = place(U, degree, mode, low, high, x[n - 1], slope, reach) if slews and reach > 0 else x[n - 1]
         if reach == 1.0:
             for r in range(n):
                 x[r] += dot(increments, which, r, z, columns)
@@ -250,9 +259,11 @@ def integrate(
                     V[i, n + 1 + j] = z[n + 1 + k * i + j]
             V[0, : n + 1] = z[: n + 1]
             matter = driven(z, n, filled, size, reach)
-            rows = unsaturated if mode == 0 else saturated
+            rows = (unsaturated if which == 0 else saturated) if side == 0 else (slewing if which == 2 else stopped)
             advance(rows, tables.influence[which, signals:], V, n, matter, most, scale, step, reach, x)
             V[: known + 1, n + 1 :] = 0.0
+        if slews:
+            x[n - 1] = m
         for r in range(n):
             scale[r] = max(scale[r], abs(x[r]))
             if abs(x[r]) < NOTHING * scale[r]:  # lest it decay to numbers that the processor is slow with
@@ -266,16 +277,17 @@ def integrate(
         if status == DIVERGED:
             break
 
-        on_limit = crossed
+        on_limit, roots = crossed, left
         if exit_at >= 0:
             if event_count == bounds.events:
                 status = EVENTFUL
                 break
             mode, kink = entered, True
-            events[event_count], modes[event_count] = t, mode
+            events[event_count], modes[event_count], places[event_count] = t, mode, m
             event_count += 1
         elif reset < len(reset_times) and t == reset_times[reset]:
-            x[: resets.shape[1]] = resets[reset]
+            for g in range(resets.shape[1]):
+                x[g] = x[g] if np.isnan(resets[reset, g]) else resets[reset, g]
             reset, kink = reset + 1, True
         if queued > 0 and queue[0] <= t + 1e-13 * (step + t):
             queued, kink = drop(queue, queued, t + 1e-13 * (step + t)), True
@@ -283,4 +295,4 @@ def integrate(
     for s in range(1 + k):
         if size[s] > 0:
             tail = max(tail, last[s] / size[s])
-    return values, events[:event_count], modes[:event_count], status, t, steps, tail
+    return values, events[:event_count], modes[:event_count], places[:event_count], status, t, steps, tail

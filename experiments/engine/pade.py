@@ -57,5 +57,6 @@ def with_pade(loop: SaturatedLoop, order: int) -> SaturatedLoop:
         Z=np.zeros((0, n + extra)),
         delays=np.zeros(0),
         x0=np.concatenate([loop.x0, pad]),
+        B_limits=None if loop.B_limits is None else np.concatenate([loop.B_limits, pad]),
         outputs={name: (np.concatenate([x, pad]) + w @ rows, np.zeros(0)) for name, (x, w) in loop.outputs.items()},
     )

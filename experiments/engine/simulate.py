@@ -12,7 +12,7 @@ import numpy as np
 
 from experiments.engine import integrator
 from experiments.engine.compiled_loop import BRIEF, CompiledLoop, compile_loop
-from experiments.engine.saturated_loop import SaturatedLoop
+from experiments.engine.saturated_loop import SaturatedLoop, with_actuator
 from experiments.engine.watched import Stopped, Tick, watched
 from identification.base.errors import InputError, shown
 
@@ -33,12 +33,14 @@ class Run:
     time_s
         Shape (s,).
     control, saturated_control
-        u and sat(u), shape (s,).
+        u and the actuator's output m, which without a rate limit is sat(u), shape (s,).
     outputs
         Name -> samples (s,).
     events_s, modes
         Every time at which u crosses a limit, located to rounding, and the mode entered: 1 at the upper limit,
-        -1 at the lower one, 0 unsaturated. A jump of u across both limits is two events at one time.
+        -1 at the lower one, 0 unsaturated. A jump of u across both limits is two events at one time. With a rate limit
+        also every time at which the actuator falls behind and catches up; while it rises the mode is 3 more, while it
+        falls 3 less.
     """
 
     time_s: np.ndarray
@@ -67,11 +69,24 @@ class Run:
 
 
 def limit_pair(limits: float | Sequence[float]) -> tuple[float, float]:
-    """The lower and the upper limit: of one number +- that; raises InputError when there are not one or two."""
+    """The lower and the upper limit, of one number +- that.
+
+    Raises
+    ------
+    InputError
+        There are not one or two, one is not positive, or of two the first is not below the second.
+    """
     pair = np.atleast_1d(np.asarray(limits, dtype=float))
     if pair.shape not in ((1,), (2,)):
         raise InputError(f"the limits are {shown(limits)}; expected one number, or a lower and an upper one")
-    return (-float(pair[0]), float(pair[0])) if pair.size == 1 else (float(pair[0]), float(pair[1]))
+    if pair.size == 1 and not pair[0] > 0:
+        raise InputError(
+            f"the saturation limit is {pair[0]:g}; expected a positive number, or a lower and an upper one"
+        )
+    low, high = (-float(pair[0]), float(pair[0])) if pair.size == 1 else (float(pair[0]), float(pair[1]))
+    if not low < high:
+        raise InputError(f"the saturation limits are {low:g} and {high:g}; expected the lower one first")
+    return low, high
 
 
 class DivergenceError(InputError):
@@ -85,7 +100,13 @@ class DivergenceError(InputError):
         self.time_s = time_s
 
 
-def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarray, tick: Tick | None = None) -> Run:
+def simulate(
+    loop: SaturatedLoop,
+    limits: tuple[float, float],
+    time_s: np.ndarray,
+    tick: Tick | None = None,
+    rate: float = math.inf,
+) -> Run:
     """Simulate a loop from t = 0; what is left out, u - sat(u), is the dead zone of Thesis Eq. (2.16).
 
     Parameters
@@ -98,11 +119,14 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
         Increasing sample times (s,), the first at 0 or later; they do not influence the integration.
     tick
         Called some times a second with the seconds of the run done since the last call.
+    rate
+        The most that the actuator's output m changes in a second, from 0 (or the limit next to it) at t = 0: m is
+        sat(u) as long as it can follow, and moves toward it at the rate when it cannot.
 
     Raises
     ------
     InputError
-        The limits are not in order, the times not increasing, the run too long for
+        The limits are not in order, the rate is not positive, the times not increasing, the run too long for
         its fastest time constant, or the control chatters past all bounds.
     DivergenceError
         The loop diverges.
@@ -113,10 +137,16 @@ def simulate(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarra
     see :func:`experiments.engine.compiled_loop.compile_loop`, is halved until the last term of every polynomial is
     below 1e-11 of the largest value of its signal. Ctrl-C stops a run between two steps.
     """
-    return watched(partial(simulate_watched, loop, limits, time_s), tick)
+    return watched(partial(simulate_watched, loop, limits, time_s, rate=rate), tick)
 
 
-def simulate_watched(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarray, watch: np.ndarray) -> Run:
+def simulate_watched(
+    loop: SaturatedLoop,
+    limits: tuple[float, float],
+    time_s: np.ndarray,
+    watch: np.ndarray,
+    rate: float = math.inf,
+) -> Run:
     """:func:`simulate` in the calling thread, under a watch of :mod:`experiments.engine.watched`.
 
     Raises
@@ -126,23 +156,27 @@ def simulate_watched(loop: SaturatedLoop, limits: tuple[float, float], time_s: n
     Stopped
         The watch says so.
     """
-    low, high = limits
-    if not low < high:
-        raise InputError(f"the saturation limits are {low:g} and {high:g}; expected the lower one first")
+    low, high = limit_pair(limits)
+    if not rate > 0:
+        raise InputError(f"the rate limit is {rate:g} a second; expected a positive number, inf for none")
     increasing = len(time_s) > 0 and time_s[0] >= 0 and time_s[-1] > 0 and np.all(np.diff(time_s) > 0)
     if not (increasing and np.all(np.isfinite(time_s))):
         raise InputError("the sample times are not increasing finite numbers from zero on that end after zero")
     horizon = float(time_s[-1])
-    compiled = compile_loop(loop, idle_step=horizon)
+    slews = math.isfinite(rate)
+    if slews:
+        loop = with_actuator(loop, float(np.clip(0.0, low, high)))
+    compiled = compile_loop(loop, idle_step=horizon, slews=slews)
     most_events, room, brief = 4096, _room(compiled), BRIEF
     while True:
         _require_affordable(compiled, room, horizon)
-        values, events, modes, status, end, _, tail = integrator.integrate(
+        values, events, modes, places, status, end, _, tail = integrator.integrate(
             compiled,
             loop.resets.times_s,
             loop.resets.values,
             float(low),
             float(high),
+            float(rate),
             time_s - compiled.lags[:, None],
             horizon,
             integrator.Bounds(int(MOST_STEPS), most_events, room),
@@ -154,7 +188,7 @@ def simulate_watched(loop: SaturatedLoop, limits: tuple[float, float], time_s: n
             most_events *= 8
         elif status == integrator.UNSETTLED or (status == integrator.COMPLETE and tail > TAIL):
             brief = 0.0 if status == integrator.UNSETTLED else brief
-            compiled = compile_loop(loop, compiled.step / 2, brief)
+            compiled = compile_loop(loop, compiled.step / 2, brief, slews=slews)
             room = max(room, _room(compiled))
         else:
             break
@@ -164,11 +198,15 @@ def simulate_watched(loop: SaturatedLoop, limits: tuple[float, float], time_s: n
         raise DivergenceError(end)
     if status != integrator.COMPLETE:
         raise InputError(f"the loop could not be integrated: {len(events)} events up to t = {end:.6g} s")
-    outputs = compiled.reading @ values[1:]
+    outputs, m = compiled.reading @ values[1:], values[0]
+    if slews and len(events):
+        last = np.searchsorted(events, time_s, side="right") - 1
+        moved = places[last] + np.sign(modes[last]) * rate * (time_s - events[last])
+        m = np.where((last >= 0) & (np.abs(modes[last]) > 1), moved, m)
     return Run(
         time_s=time_s,
         control=values[0],
-        saturated_control=np.clip(values[0], low, high),
+        saturated_control=np.clip(m, low, high),
         outputs=dict(zip(loop.outputs, outputs, strict=True)),
         events_s=events,
         modes=modes,

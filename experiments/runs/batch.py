@@ -13,7 +13,7 @@ import numpy as np
 from tqdm import tqdm
 
 from design.design_file import Asked, Design
-from experiments.engine.simulate import Run, simulate_watched
+from experiments.engine.simulate import Run, limit_pair, simulate_watched
 from experiments.engine.watched import STOP, watch
 from experiments.runs.design_loop import Controller, plant_loop, realized_controller
 from experiments.runs.references import Reference, SampledReference
@@ -28,12 +28,12 @@ Tick = Callable[[], object]
 
 
 class Case(NamedTuple):
-    """What was run: the true plant, the reference, the anti-windup's name, and sat to +-limit."""
+    """What was run: the true plant, the reference, the anti-windup's name, and the limit, a number or a pair."""
 
     plant: PlantModel
     reference: Reference | SampledReference
     anti_windup: str
-    limit: float
+    limit: float | tuple[float, float]
 
 
 def simulate_many(
@@ -41,7 +41,7 @@ def simulate_many(
     plants: Iterable[PlantModel],
     references: Sequence[Reference | SampledReference],
     anti_windups: Mapping[str, Asked],
-    limits: Sequence[float],
+    limits: Sequence[float | tuple[float, float]],
     time_s: np.ndarray,
     workers: int | None = None,
 ) -> Iterator[tuple[Case, Run | InputError]]:
@@ -54,7 +54,7 @@ def simulate_many(
     plants
         The true plants; may be a generator, from which no more is taken than is run.
     references, anti_windups, limits
-        r(t); name -> theta1~, None for no anti-windup; positive, the actuator's limits are +-limit.
+        r(t); name -> theta1~, None for no anti-windup; of the actuator, each (lower, upper) or one number for +- that.
     workers
         Threads; as many as there are cores unless given.
 
@@ -68,7 +68,7 @@ def simulate_many(
     Raises
     ------
     InputError
-        A limit that is not positive, or fewer workers than one.
+        Limits that :func:`experiments.engine.simulate.limit_pair` refuses, or fewer workers than one.
 
     Notes
     -----
@@ -76,8 +76,8 @@ def simulate_many(
     some eight cores; a campaign (:mod:`experiments.campaign.run_plants`) runs in processes, or on a cluster.
     """
     references, limits = tuple(references), tuple(limits)
-    if bad := [limit for limit in limits if not limit > 0]:
-        raise InputError(f"a limit is {bad[0]:g}; expected positive numbers")
+    for limit in limits:
+        limit_pair(limit)
     count = os.cpu_count() or 1 if workers is None else workers
     if count < 1:
         raise InputError(f"{count} workers are asked for; expected one at least")
@@ -94,7 +94,7 @@ def _streamed(
     def run(case: Case) -> Run | InputError:
         try:
             loop = plant_loop(controllers[case.anti_windup], case.plant, case.reference)
-            return simulate_watched(loop, (-case.limit, case.limit), time_s, state)
+            return simulate_watched(loop, limit_pair(case.limit), time_s, state)
         except InputError as error:
             return error
 

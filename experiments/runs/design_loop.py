@@ -11,7 +11,8 @@ from design.blocks.block import Block, plant_block
 from design.blocks.state_space import StateSpace, block_diagonal, realize
 from design.design_file import Asked, Design
 from experiments.engine.saturated_loop import SaturatedLoop
-from experiments.runs.references import Generator, Reference, SampledReference
+from experiments.runs.disturbances import UNDISTURBED, Disturbances, combined
+from experiments.runs.references import Reference, SampledReference
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
@@ -21,6 +22,7 @@ def design_loop(
     reference: Reference | SampledReference,
     anti_windup: Asked,
     plant: PlantModel | None = None,
+    disturbances: Disturbances = UNDISTURBED,
 ) -> SaturatedLoop:
     """The loop of Fig. 2.6 around a design, from rest, which obeys Thesis Lemma 2 and its steps, Eq. (2.10)-(2.15).
 
@@ -35,12 +37,14 @@ def design_loop(
     plant
         The true plant, with at least one pole more than zeros; the design's own model unless given. The controller
         keeps the model in F, K and theta2, dead time and all.
+    disturbances
+        At the plant's input and output, and noise.
 
     Returns
     -------
     SaturatedLoop
         With the outputs ``reference``, ``output`` (y), ``error`` (r - y), ``y_lin`` (y + y_d) and ``v``, which
-        is the control that the loop would have without saturation.
+        is the control that the loop would have without saturation; with noise also ``measured``, y and the noise.
 
     Notes
     -----
@@ -51,6 +55,11 @@ def design_loop(
     with 1/(1 + F) = A/Lambda in chapter 2, and v = K e + T_so exp(-T_d s) v in chapter 3: 1 + F is never
     inverted as a block, theta1~ is strictly proper and so is P, and no algebraic loop is left.
 
+    Behind an actuator with a rate limit u_tilde is still u - sat(u), as of a controller that knows the limits only, and
+    y + y_d is no longer the response of the loop without saturation. It would be with u_tilde = u - m, m being what
+    the actuator gives out. But theta1~ is designed for the dead zone, which has no memory, and an actuator that slews
+    lags: with theta1~(0) = -1 runs with u - m ended in limit cycles where those with u - sat(u) settled.
+
           r -->(+)--> K/(1+F) --v-->(+)--> u --> sat --u_m--> P exp(-hs) --> y
                -^                   -^     |                                 |
                 |                    |     +--> u_tilde --> theta1~          |
@@ -58,7 +67,7 @@ def design_loop(
                 +---- y_d <-- theta2 <-- u_tilde            '                |
                 +------------------------------------------------------------+
     """
-    return plant_loop(realized_controller(design, anti_windup), plant or design.loop_plant, reference)
+    return plant_loop(realized_controller(design, anti_windup), plant or design.loop_plant, reference, disturbances)
 
 
 @dataclass(frozen=True)
@@ -91,7 +100,12 @@ def realized_controller(design: Design, anti_windup: Asked) -> Controller:
     return Controller(forward, feedback, theta, model.delay_s)
 
 
-def plant_loop(controller: Controller, plant: PlantModel, reference: Reference | SampledReference) -> SaturatedLoop:
+def plant_loop(
+    controller: Controller,
+    plant: PlantModel,
+    reference: Reference | SampledReference,
+    disturbances: Disturbances = UNDISTURBED,
+) -> SaturatedLoop:
     """:func:`design_loop` around a true plant.
 
     Raises
@@ -103,7 +117,7 @@ def plant_loop(controller: Controller, plant: PlantModel, reference: Reference |
         raise InputError("the true plant has as many zeros as poles; expected more poles, or the loop is algebraic")
     P = realize(plant_block(plant))
     delays = np.array([plant.delay_s, controller.delay_s, controller.delay_s])
-    return _assemble(P, controller.forward, controller.feedback, controller.theta, reference.generator(), delays)
+    return _assemble(P, controller.forward, controller.feedback, controller.theta, reference, disturbances, delays)
 
 
 def _assemble(
@@ -111,10 +125,15 @@ def _assemble(
     forward: StateSpace,
     feedback: StateSpace,
     theta: StateSpace,
-    generator: Generator,
+    reference: Reference | SampledReference,
+    disturbances: Disturbances,
     delays: np.ndarray,
 ) -> SaturatedLoop:
-    """States: reference, plant, K/(1+F) or K, T_so, [theta1~; theta2]. Delayed: P's, theta2's and T_so's outputs."""
+    """States: what is generated, plant, K/(1+F) or K, T_so, [theta1~; theta2]. Delayed: outputs of P, theta2, T_so."""
+    present = {name: signal for name, signal in vars(disturbances).items() if signal is not None}
+    generator, rows = combined([signal.generator() for signal in (reference, *present.values())])
+    added = dict.fromkeys(vars(disturbances), np.zeros(len(generator.start)))
+    added |= dict(zip(present, rows[1:], strict=True))
     sizes = [len(generator.start), len(P.b), len(forward.b), len(feedback.b), len(theta.b)]
     edges = np.concatenate([[0], np.cumsum(sizes)])
     at_r, at_P, at_K, at_T, at_theta = (slice(a, b) for a, b in pairwise(edges))
@@ -129,12 +148,14 @@ def _assemble(
 
     # w = (y, y_d, [T_so v] delayed), each a function of the states only: P, theta2 and T_so are strictly proper
     Z = np.stack([row(P=P.C[0]), row(theta=theta.C[1]), row(T=feedback.C[0])])
-    e_x, e_w = row(r=generator.row), np.array([-1.0, -1.0, 0.0])
+    r, d, measured = (row(r=x) for x in (generator.row, added["output"], added["output"] + added["noise"]))
+    e_x, e_w = r - measured, np.array([-1.0, -1.0, 0.0])
     v_x = row(K=forward.C[0]) + forward.d[0] * e_x
     v_w = forward.d[0] * e_w + np.array([0.0, 0.0, 1.0])
     u_x = v_x - row(theta=theta.C[0])
 
     A = block_diagonal(generator.matrix, P.A, forward.A, feedback.A, theta.A)
+    A[at_P, at_r] += np.outer(P.b, added["input"])
     D = np.zeros((n, 3))
     A[at_K] += np.outer(forward.b, e_x)
     D[at_K] += np.outer(forward.b, e_w)
@@ -155,11 +176,13 @@ def _assemble(
         delays=delays,
         x0=x0,
         outputs={
-            "reference": (e_x, np.zeros(3)),
-            "output": (np.zeros(n), y),
-            "error": (e_x, -y),
-            "y_lin": (np.zeros(n), np.array([1.0, 1.0, 0.0])),
+            "reference": (r, np.zeros(3)),
+            "output": (d, y),
+            "error": (r - d, -y),
+            "y_lin": (d, np.array([1.0, 1.0, 0.0])),
             "v": (v_x, v_w),
-        },
+        }
+        | ({"measured": (measured, y)} if disturbances.noise else {}),
         resets=generator.resets,
+        B_limits=-row(theta=theta.b),
     )

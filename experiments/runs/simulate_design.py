@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,6 +11,7 @@ from design.design_file import Asked, Design
 from experiments.engine.simulate import Run, limit_pair, simulate
 from experiments.runs.compare_anti_windups import span
 from experiments.runs.design_loop import design_loop
+from experiments.runs.disturbances import UNDISTURBED, Disturbances
 from experiments.runs.references import Reference, SampledReference
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
@@ -27,6 +29,8 @@ def simulate_design(
     until_s: float | None = None,
     samples: int = SAMPLES,
     plant: PlantModel | None = None,
+    rate_limit: float = math.inf,
+    disturbances: Disturbances = UNDISTURBED,
 ) -> Run:
     """Simulate the loop of Fig. 2.6 around a design from rest, every dead time exact.
 
@@ -47,6 +51,11 @@ def simulate_design(
         How many evenly spaced times the run is read at; they do not influence the integration.
     plant
         The true plant; the design's own model unless given.
+    rate_limit
+        The most that the actuator's output changes in a second, in its unit. The controller knows the limits and not
+        the rate: u_tilde stays u - sat(u), see :func:`experiments.runs.design_loop.design_loop`.
+    disturbances
+        At the plant's input and output, and measurement noise.
 
     Returns
     -------
@@ -63,6 +72,5 @@ def simulate_design(
         raise InputError(f"{samples} samples are asked for; expected two or more")
     if until_s is None:
         until_s = PERIODS * span(design, reference) if isinstance(reference, Reference) else reference.time_s[-1]
-    return simulate(
-        design_loop(design, reference, anti_windup, plant), limit_pair(limits), np.linspace(0.0, until_s, samples)
-    )
+    loop = design_loop(design, reference, anti_windup, plant, disturbances)
+    return simulate(loop, limit_pair(limits), np.linspace(0.0, until_s, samples), rate=rate_limit)

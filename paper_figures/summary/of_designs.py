@@ -80,7 +80,12 @@ def loop_table(designs: Mapping[str, Design], tables: Mapping[str, pd.DataFrame]
 
 
 def sentences(design: Design, name: str, tables: Mapping[str, pd.DataFrame]) -> str:
-    """What a design is and gives; its limits and the parameter study of f if there are tables of them."""
+    """What a design is and gives, first of all which anti-windup does harm; and what the tables add."""
+    harm = [f"{sentence}. " for sentence in design.compared if "WORSE" in sentence]
+    return "".join(harm) + _sentences(design, name, tables)
+
+
+def _sentences(design: Design, name: str, tables: Mapping[str, pd.DataFrame]) -> str:
     if name == "robust":
         return _redesign(design, tables.get("robustness"))
     if design.hinf is not None:

@@ -30,7 +30,7 @@ def other_plants(design: Design, count: int) -> list[PlantModel]:
 
 @pytest.mark.parametrize("workers", [1, 2, 5])
 def test_a_batch_is_its_runs_one_by_one(extended_design: Design, workers: int) -> None:
-    plants, limits = other_plants(extended_design, 3), [9.0, 15.0]
+    plants, limits = other_plants(extended_design, 3), [9.0, (-7.0, 15.0)]
     kinds = {"none": None, "corrected": extended_design.compensator("corrected")}
     found = list(simulate_many(extended_design, plants, REFERENCES, kinds, limits, TIMES, workers))
     expected = list(itertools.product(plants, REFERENCES, kinds, limits))
@@ -39,7 +39,8 @@ def test_a_batch_is_its_runs_one_by_one(extended_design: Design, workers: int) -
         assert case.plant is plant
         assert case.reference is reference
         assert (case.anti_windup, case.limit) == (kind, limit)
-        single = simulate(design_loop(extended_design, reference, kinds[kind], plant), (-limit, limit), TIMES)
+        pair = limit if isinstance(limit, tuple) else (-limit, limit)
+        single = simulate(design_loop(extended_design, reference, kinds[kind], plant), pair, TIMES)
         assert not isinstance(run, InputError)
         np.testing.assert_array_equal(run.control, single.control)
         np.testing.assert_array_equal(run.events_s, single.events_s)

@@ -12,7 +12,10 @@ from click.testing import CliRunner, Result
 from data.thesis import model_named
 from design.design_file import Design
 from experiments.__main__ import main
-from experiments.drive.sampled_loop import Drive, simulate_sampled
+from experiments.drive.sampled_loop import Drive, SampledRun, simulate_sampled
+from experiments.engine.simulate import Run, simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.disturbances import Disturbances, noise, steps
 from experiments.runs.references import Reference
 
 SIMULATE = ["--limit", "12", "--anti-windup", "corrected", "--until", "1", "--sample-time", "0.01"]
@@ -109,6 +112,8 @@ def test_sampled_writes_the_run(extended_design: Design, design_json: Path) -> N
     )
     assert len(table) == 801
     for name, values in vars(run).items():
+        if values is None:
+            continue
         np.testing.assert_allclose(table[name], values, rtol=1e-10, atol=1e-10, err_msg=name)
     beyond = np.flatnonzero(np.abs(run.control) > 12)
     assert f"801 rows -> {design_json.parent / 'run.csv'}; {len(beyond)} samples beyond the limits" in result.stdout
@@ -158,3 +163,70 @@ def test_sampled_rates_is_for_the_extended_design(delay_free_design: Design, tmp
     assert result.exit_code == 2
     assert "kind is 'delay-free'; expected 'extended'" in result.stderr
     assert [file.name for file in tmp_path.iterdir()] == ["delay_free.json"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    ("words", "limits"),
+    [(["-3", "8"], (-3, 8)), (["-3,8"], (-3, 8)), (["-3 8"], (-3, 8)), (["1", "2.5"], (1, 2.5)), (["4"], (-4, 4))],
+)
+def test_two_limits_or_one(command: str, words: list[str], limits: tuple[float, float], design_json: Path) -> None:
+    table = written(invoke(command, design_json, "--until", "3", "--limit", *words), design_json)
+    np.testing.assert_allclose(table["saturated_control"], np.clip(table["control"], *limits), atol=1e-10)
+    assert (table["saturated_control"].min(), table["saturated_control"].max()) == limits
+
+
+def test_the_argument_after_one_limit_is_the_design(design_json: Path) -> None:
+    output = str(design_json.parent / "run.csv")
+    words = ["--limit", "-3", "8", str(design_json), *SIMULATE[2:], "--amplitude", "50", "--output", output]
+    assert CliRunner().invoke(main, ["simulate", *words]).exit_code == 0
+    assert CliRunner().invoke(main, ["simulate", "--limit", "8", *words[3:]]).exit_code == 0
+
+
+DISTURBED = ["--input-disturbance", "2", "--input-disturbance", "-1", "0.5", "--output-disturbance", "3", "0.2"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_disturbances_and_noise(command: str, extended_design: Design, design_json: Path) -> None:
+    disturbances = Disturbances(steps([(2.0, 0.0), (-1.0, 0.5)]), steps([(3.0, 0.2)]), noise(0.1, 100.0, 5, 1.0))
+    result = invoke(command, design_json, *DISTURBED, "--noise", "0.1", "100", "--seed", "5", "--phase", "0.3")
+    table = written(result, design_json)
+    reference, time_s = Reference((50.0,), (1.5,), (0.3,), 0.0), table["time_s"].to_numpy()
+    run: Run | SampledRun
+    if command == "simulate":
+        run = simulate(design_loop(extended_design, reference, "corrected", None, disturbances), (-12.0, 12.0), time_s)
+        measured, output = run.outputs["measured"], run.outputs["output"]
+    else:
+        drive = Drive(800.0, "tustin", (-12.0, 12.0))
+        run = simulate_sampled(extended_design, reference, "corrected", drive, 1.0, disturbances=disturbances)
+        assert run.measured is not None
+        measured, output = run.measured, run.output
+    np.testing.assert_allclose(table["measured"], measured, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(table["output"], output, rtol=1e-10, atol=1e-10)
+    assert "is not judged under disturbances" in result.stdout
+
+
+def test_a_rate_limit(design_json: Path) -> None:
+    result = invoke("simulate", design_json, "--rate-limit", "40", "--phase", "1")
+    table = written(result, design_json)
+    assert np.abs(np.diff(table["saturated_control"])).max() == pytest.approx(0.4, rel=1e-9)
+    assert "No guarantee: the actuator was too slow" in result.stdout
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["--limit", "3", "-3"], "--limit is 3 -3; expected the lower limit first"),
+        (["--limit", "3,4,5"], "'3,4,5' is neither a number nor two"),
+        (["--limit", "nan", "3"], "--limit is nan 3"),
+        (["--noise", "1", "100"], "--noise is given without --seed"),
+        (["--seed", "1"], "--seed is given without --noise"),
+        (["--input-disturbance", "1", "-2"], "begins at -2 s"),
+        (["--output-disturbance", "1", "--output-disturbance", "2"], "two levels of a disturbance begin at 0 s"),
+    ],
+)
+def test_limits_and_disturbances_that_are_none(
+    command: str, arguments: list[str], part: str, design_json: Path
+) -> None:
+    refused(invoke(command, design_json, *arguments), design_json, part)
