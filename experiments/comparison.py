@@ -98,7 +98,7 @@ def comparison_tables(
     from_s, least = _least_error(design, reference, limit, period)
     rows = []
     for name in ("none", *design.anti_windup, *OTHERS):
-        known = {"limit": limit, "required": required, "refused": refused.get(name)}
+        known: dict[str, object] = {"limit": limit, "required": required, "refused": refused.get(name)}
         if name in kinds:
             known |= _promised(design, kinds[name])
         for upset, start_s in (("start", 0.0), ("pulse", begin)):
@@ -129,7 +129,7 @@ def _promised(design: Design, kind: AntiWindup | None) -> dict[str, object]:
     sector = guarantee(design, kind).sector
     said = "none" if sector == 0 else "global" if sector >= 1 else f"sector {sector_text(sector)}"
     if kind is None or not kind.theta1_tilde.is_stable:
-        return {"guarantee": said}
+        return {"guarantee": said, "f": np.nan}
     return {"guarantee": said, "f": uncertainty_cost(design.additive_bound, kind.one_plus)[0]}
 
 

@@ -110,7 +110,8 @@ def internal_model(loop: LinearLoop) -> AntiWindup:
         The plant has a pole with Re s >= 0, which theta2 = P would have too.
     """
     if poles := plant_block(loop.plant).unstable_poles:
-        raise InputError(f"the plant has the pole {poles[0]:.4g} rad/s; the internal model expects a stable plant")
+        at = f"{poles[0]:.4g} rad/s" if poles[0] else "s = 0"
+        raise InputError(f"the plant has a pole at {at}; the internal model expects a stable plant")
     return AntiWindup(Block(0.0), Block(1.0))
 
 
@@ -144,5 +145,5 @@ def _axis_poles(loop: LinearLoop) -> tuple[complex, ...]:
     roots = [abs(root) for root in (*loop.feedback.poles, *loop.feedback.zeros, *waves) if root]
     circle = AROUND_ZERO * min(roots) * np.exp(2j * np.pi * np.arange(ON_CIRCLE + 1) / ON_CIRCLE)
     phase = np.unwrap(np.angle(1 - loop.feedback(circle) * np.exp(-loop.plant.delay_s * circle)))
-    at_zero = round((phase[-1] - phase[0]) / (2 * np.pi)) - max(loop.plant.integrators, 0)
-    return waves + (0j,) * at_zero
+    turns = round(float(phase[-1] - phase[0]) / (2 * np.pi))
+    return (*waves, *[0j] * (turns - max(loop.plant.integrators, 0)))
