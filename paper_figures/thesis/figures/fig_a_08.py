@@ -30,6 +30,7 @@ KINDS = {
     "weston-postlethwaite": "Weston and Postlethwaite",
     "static": "static",
 }
+SHORT = {"thesis anti-windup": "thesis", "corrected anti-windup": "corrected"}
 UPSETS = {"start": ("a", "c"), "pulse": ("b", "d")}
 SHOWN = 0.5  # of the time that an upset counts
 FLOOR = 1e-3  # of the amplitude
@@ -76,11 +77,14 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
         chosen = (runs["time_s"] >= begin) & (runs["time_s"] <= begin + SHOWN * half)
         _distances(axes[above], runs[chosen], begin, amplitude)
         _measures(axes[below], table[table["upset"] == upset])
-    axes["b"].set_ylabel("")
-    axes["d"].set_ylabel("")
+    for letter in "bd":
+        axes[letter].set_ylabel("")
+    handles = axes["a"].get_legend_handles_labels()
+    middle = (len(handles[0]) + 1) // 2
+    for letter, part in (("a", slice(middle)), ("b", slice(middle, None))):
+        axes[letter].legend(*(each[part] for each in handles), **panels.ABOVE, ncols=2)
     figure = axes["a"].get_figure(root=True)
     assert figure is not None
-    figure.legend(*axes["a"].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     return figure
 
 
@@ -91,7 +95,7 @@ def _distances(panel: Axes, runs: pd.DataFrame, begin: float, amplitude: float) 
             distance = (runs[f"output_{run}"] - runs["output_unsaturated"]).abs().to_numpy(float) / amplitude
             line = LINES[kind]
             points = panels.envelope(time_s, np.maximum(distance, FLOOR / 10))
-            panel.plot(*points, **line, label=kind, zorder=3 - line["linewidth"] / 10)
+            panel.plot(*points, **line, label=SHORT.get(kind, kind), zorder=3 - line["linewidth"] / 10)
     panel.axhline(SETTLED, **LINES["saturation limits"])
     panel.set(yscale="log", ylim=(FLOOR, 10.0), xlim=(0.0, time_s[-1]))
     panel.set(xlabel="Time after the upset [s]", ylabel=r"$|y - y_\mathrm{unsaturated}|$ / amplitude")
