@@ -84,6 +84,7 @@ def simulate_command(
     from experiments.runs.disturbances import UNDISTURBED
     from experiments.runs.guarantee import guarantee
     from experiments.runs.metrics import last_saturation
+    from experiments.runs.region import require_within_region
     from experiments.runs.sector_promise import judge_run
 
     limits = asked_limits(limit)
@@ -107,6 +108,7 @@ def simulate_command(
     asked = reference_of(content, **reference)
     disturbances = disturbances_of(until, input_disturbance, output_disturbance, noise, seed)
     true = None if plant is None else asked_model(plant).plant
+    require_within_region(true or content.loop_plant, asked, limits)
     loop = design_loop(content, asked, kind, true, disturbances)
     with tqdm(total=until, desc="simulate", bar_format=SHARE, disable=None, leave=False) as bar:
         run = simulate(loop, limits, time_s, bar.update, rate_limit)
@@ -121,21 +123,23 @@ def simulate_command(
         }
         | ({"measured": run.outputs["measured"]} if noise else {})
     )
-    promised = ""
-    if kind is not None and disturbances != UNDISTURBED:
+    saturated = last_saturation(run)
+    never = not len(run.events_s) and not np.isnan(saturated)
+    if kind is None or never:
+        promised = ""
+    elif disturbances != UNDISTURBED:
         promised = UNJUDGED
-    elif kind is not None and np.any(np.abs(run.modes) > 1):
+    elif np.any(np.abs(run.modes) > 1):
         promised = "No guarantee: the actuator was too slow for the control, and a guarantee is of limits alone"
-    elif kind is not None:
+    else:
         given = guarantee(content, kind, true)
         promised = str(judge_run(given, loop, limits, run, asked, true or content.loop_plant))
     write_tables({output: table}, inputs)
-    saturated = last_saturation(run)
     beyond, crossings = ("saturated", "crossings of the limits")
     if math.isfinite(rate_limit):
         beyond, crossings = ("saturated or slewing", "beginnings and ends of saturation or slewing")
     said = f"{beyond} to the end" if np.isnan(saturated) else f"last {beyond} at {saturated:.6g} s"
-    if not len(run.events_s) and not np.isnan(saturated):
+    if never:
         said = f"never {beyond}"
     click.echo(_first(promised, f"{len(table)} rows -> {output}; {len(run.events_s)} {crossings}, {said}"))
 
@@ -193,6 +197,7 @@ def sampled_command(
     from experiments.drive.sampled_loop import Drive, simulate_sampled
     from experiments.runs.disturbances import UNDISTURBED
     from experiments.runs.guarantee import guarantee
+    from experiments.runs.region import require_within_region
     from experiments.runs.sector_promise import steady_control, verdict
 
     drive = Drive(rate, method, asked_limits(limit), quantum, slew, input_delay, resolution)
@@ -204,6 +209,7 @@ def sampled_command(
     asked = reference_of(content, **reference)
     disturbances = disturbances_of(until, input_disturbance, output_disturbance, noise, seed)
     true = None if plant is None else asked_model(plant).plant
+    require_within_region(true or content.loop_plant, asked, drive.limits)
     with tqdm(total=until * rate, desc="sampled", bar_format=SHARE, disable=None, leave=False) as bar:
         run = simulate_sampled(content, asked, kind, drive, until, true, bar.update, disturbances, form)
     low, high = drive.limits

@@ -127,6 +127,17 @@ def test_an_unstable_pole_is_held() -> None:
     assert np.abs(run.outputs["error"][-100:]).max() < 1e-3
 
 
+def test_a_reference_beyond_the_region_of_an_unstable_plant_is_refused() -> None:
+    plant = PlantModel(2.0, (), (), 0.05, 0, real_poles=(3.0, -1.0))
+    design = design_extended(IdentifiedModel(plant, bound_of(plant, 2.0, 0.005)), [0.5])
+    needed = 1 / abs(complex(plant.without_delay()(0.5j)))
+    with pytest.raises(
+        InputError, match=r"a pole at 1\+0j rad/s in the right half plane .* less than 0.8 times this one"
+    ):
+        simulate_design(design, 0.8 * needed, sinusoid(1.0, 0.5))
+    assert simulate_design(design, 3 * needed, sinusoid(1.0, 0.5), until_s=8.0).time_s[-1] == 8.0
+
+
 def test_without_integral_action_where_the_model_is_not_known_at_rest() -> None:
     """|W_a/P| is above the level at s = 0 alone: the sinusoid is followed, and the design says what it does without."""
     plant = PlantModel(1.0, (), (Mode(30.0, 0.05),), 0.01, 0)
