@@ -17,6 +17,7 @@ import click
 
 from experiments.campaign.command import campaign_command
 from experiments.options import DESIGN, OUTPUT_FOLDER, sinusoid_options
+from experiments.pair_options import NumberPair, PairCommand
 from experiments.run_commands import sampled_command, simulate_command
 from experiments.tables import write_into
 from experiments.thesis.commands import thesis
@@ -57,20 +58,26 @@ def campaign_distributions(campaign: Path, output: Path) -> None:
     write_into(output, campaign_tables(campaign))
 
 
-@main.command("limits")
+@main.command("limits", cls=PairCommand)
 @DESIGN
 @click.option(
-    "--limit", "limits", type=float, multiple=True, required=True, help="Saturation limits +-LIMIT; repeatable."
+    "--limit",
+    "limits",
+    type=NumberPair(),
+    metavar="[LOW] HIGH",
+    multiple=True,
+    required=True,
+    help="Saturation limits in the actuator's unit, LOW < HIGH, or one number for +- that; repeatable.",
 )
 @sinusoid_options
 @OUTPUT_FOLDER
-def limits(design: Path, limits: tuple[float, ...], output: Path, **reference: Any) -> None:
+def limits(design: Path, limits: tuple[tuple[float, ...], ...], output: Path, **reference: Any) -> None:
     """What no controller of DESIGN's plant can better: limits_KIND.csv, limits_KIND_summary.csv (the first LIMIT)."""
     from tqdm import tqdm
 
     from design.design_file import read_design
     from experiments.asked_reference import sinusoids
-    from experiments.physical_limits.least_peak_error import limits_tables
+    from experiments.physical_limits.limits_tables import limits_tables
 
     content = read_design(design)
     with tqdm(desc="limits", unit="", disable=None, leave=False) as bar:

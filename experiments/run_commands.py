@@ -119,21 +119,23 @@ def simulate_command(
         }
         | ({"measured": run.outputs["measured"]} if noise else {})
     )
-    promised = ""
-    if kind is not None and disturbances != UNDISTURBED:
+    saturated = last_saturation(run)
+    never = not len(run.events_s) and not np.isnan(saturated)
+    if kind is None or never:
+        promised = ""
+    elif disturbances != UNDISTURBED:
         promised = UNJUDGED
-    elif kind is not None and np.any(np.abs(run.modes) > 1):
+    elif np.any(np.abs(run.modes) > 1):
         promised = "No guarantee: the actuator was too slow for the control, and a guarantee is of limits alone"
-    elif kind is not None:
+    else:
         given = guarantee(content, kind, true)
         promised = str(judge_run(given, loop, limits, run, asked, true or content.loop_plant))
     write_tables({output: table}, inputs)
-    saturated = last_saturation(run)
     beyond, crossings = ("saturated", "crossings of the limits")
     if math.isfinite(rate_limit):
         beyond, crossings = ("saturated or slewing", "beginnings and ends of saturation or slewing")
     said = f"{beyond} to the end" if np.isnan(saturated) else f"last {beyond} at {saturated:.6g} s"
-    if not len(run.events_s) and not np.isnan(saturated):
+    if never:
         said = f"never {beyond}"
     click.echo(_first(promised, f"{len(table)} rows -> {output}; {len(run.events_s)} {crossings}, {said}"))
 

@@ -27,6 +27,10 @@ WORTH, RESOLVED = 1e-6, 1e-9  # by which f must be better for another theta1~, o
 PROGRAMS, MOST = 100, 1e-2  # solved programs with which WORTH grows tenfold, and up to what
 
 
+class NoCompensatorError(InputError):
+    """No theta1~ of the class meets the condition."""
+
+
 @dataclass(frozen=True)
 class Corrected:
     """The corrected compensator and its cost.
@@ -81,7 +85,7 @@ def corrected(
     Raises
     ------
     InputError
-        A number is out of its range, or no such theta1~ meets the condition.
+        A number is out of its range; or, as a NoCompensatorError, no such theta1~ meets the condition.
 
     Notes
     -----
@@ -125,7 +129,7 @@ def corrected(
     fine = np.unique([np.repeat(i[near], len(beside)), (j[near, None] + beside).ravel()], axis=1)
     search.run(*fine[:, fine[1] >= 0])
     if search.best is None:
-        raise InputError(
+        raise NoCompensatorError(
             f"no theta1~ of our class with poles from {slowest:g} to {bandwidth:g} rad/s was found that meets "
             f"{condition}; expected a weaker guarantee or a slower recovery"
         )

@@ -11,12 +11,12 @@ import numpy as np
 from design.anti_windup.chosen_guarantee import chosen_guarantee
 from design.anti_windup.compensator import AntiWindup, second_order, uncertainty_cost
 from design.anti_windup.condition import Robustness, Sector
-from design.anti_windup.corrected_compensator import SETTLED, corrected
+from design.anti_windup.corrected_compensator import SETTLED, NoCompensatorError, corrected
 from design.anti_windup.kyp_certificate import Rows, certificate, proved_storage
 from design.anti_windup.popov import popov_sector, robust_loss, robust_popov_sector
 from design.anti_windup.thesis_compensator import thesis_choice
 from design.blocks.block import Block, bound_block, fastest_root, plant_block
-from design.choices import GUARANTEES
+from design.choices import GUARANTEES, WEAKER
 from identification.base.errors import InputError, shown
 from identification.base.json_object import Reader, numbers, or_none, record
 from identification.model.additive_bound import AdditiveBound
@@ -235,7 +235,8 @@ def compensators(
         as far as they say anything, and at least ten times the rate ln(100)/own_s. It does not depend on
         ``recovery_s``, so that f does not increase with it.
     guarantee, sector, robustness
-        Of the corrected compensator, see :func:`design.anti_windup.chosen_guarantee.chosen_guarantee`.
+        Of the corrected compensator, see :func:`design.anti_windup.chosen_guarantee.chosen_guarantee`. Where the sector
+        is not stated and no compensator has it, the next of :data:`design.choices.WEAKER` is taken.
     highest_omega
         Highest frequency in rad/s at which the plant was measured; None where it is not known. A root of W_a beyond it
         says nothing of the plant, so that the bandwidth that is not given ends there, or at the loop's own rate
@@ -254,7 +255,16 @@ def compensators(
             bandwidth = max(min(bandwidth, highest_omega), own_rate)
     unstable, pace = plant_block(plant).unstable_poles, own_s if recovery_s is None else recovery_s
     name, condition, said = chosen_guarantee(unstable, guarantee, sector, robustness)
-    found = corrected(unstable, bound, pace, condition, bandwidth, faster=recovery_s is not None)
+    weaker = [Sector(k) for k in WEAKER if isinstance(condition, Sector) and sector is None]
+    while True:
+        try:
+            found = corrected(unstable, bound, pace, condition, bandwidth, faster=recovery_s is not None)
+            break
+        except NoCompensatorError:
+            if not weaker:
+                raise
+            said = f"{said}; no theta1~ of the class was found that meets {condition}"
+            condition = weaker.pop(0)
     M = found.anti_windup.one_plus
     k, proof = (condition.k, None) if isinstance(condition, Sector) else (None, certificate(M))
     own = judge(plant, bound, found.anti_windup)

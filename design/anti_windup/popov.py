@@ -173,7 +173,10 @@ class _Search:
             )
             on_grid, at = max((lowest[k], float(self.trials[k])), (float(-found.fun), float(found.x) * unit))
             refined = self.lowest_refined(at)
-            height, multiplier = max((height, multiplier), (refined, at))
+            if refined > height + BELOW * abs(
+                height
+            ):  # or the circle criterion, which needs no multiplier, says as much
+                height, multiplier = refined, at
             if on_grid - refined <= BELOW * abs(refined):
                 break
         return height, multiplier

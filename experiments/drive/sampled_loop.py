@@ -163,8 +163,8 @@ def simulate_sampled(
     Raises
     ------
     InputError
-        The run is shorter than a sample or has too many steps, the true plant has no pole more than zeros, or the
-        rate is too low for the controller's equations to have one solution.
+        The run is shorter than a sample or has too many steps, or the rate is too low for the controller's equations
+        to have one solution.
     DivergenceError
         The loop diverges.
 
@@ -202,16 +202,14 @@ def simulate_sampled(
 
 def _series(plant: PlantModel, drive: Drive, until_s: float, disturbance: Signal | None) -> Series:
     """The plant as the run carries it, its dead time and the drive's in whole samples and a rest."""
-    if plant.relative_degree < 1:
-        raise InputError("the true plant has as many zeros as poles; expected more poles, or the loop is algebraic")
     T = 1 / drive.rate_hz
     P = realize(plant_block(plant))
-    A, b, c = P.A, P.b, P.C[0]
+    A, b, c, through = P.A, P.b, P.C[0], float(P.d[0])
     knots, pieces = np.zeros(0), np.zeros((0, 0))
     if disturbance is not None:
         source = disturbance.generator()
         g, n = len(source.start), len(b)
-        A, b, c = block_diagonal(A, source.matrix), np.pad(b, (0, g)), np.pad(c, (0, g))
+        A, b, c = block_diagonal(A, source.matrix), np.pad(b, (0, g)), np.append(c, through * source.row)
         A[:n, n:] = np.outer(P.b, source.row)
         knots = np.append(0.0, source.resets.times_s)
         pieces = np.vstack([source.start, source.resets.values.reshape(-1, g)])
@@ -226,7 +224,7 @@ def _series(plant: PlantModel, drive: Drive, until_s: float, disturbance: Signal
     whole, rest = split(late_s, T)
     ahead_s = late_s - plant.delay_s  # of the plant's own time, in which commands are not late
     early = max(math.ceil(ahead_s / T - SPARE), 0) if len(knots) else 0
-    return Series(A, b, c, norm, whole, (1 - rest) * T, knots - ahead_s, pieces, early)
+    return Series(A, b, c, through, norm, whole, (1 - rest) * T, knots - ahead_s, pieces, early)
 
 
 def _controller(

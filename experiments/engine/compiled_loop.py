@@ -9,6 +9,7 @@ import numpy as np
 
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.step_table import Rows, Tables, compressed, tabulate, whole_lanes
+from identification.base.errors import InputError
 
 FURTHEST = 4.0  # fastest root times step: the terms of a series grow to exp of it, and two digits are lost
 BRIEF = 0.01  # a dead time shorter than so much of the fastest root's time constant is no longer than a step
@@ -21,7 +22,7 @@ class CompiledLoop(NamedTuple):
     ----------
     unsaturated
         Over (x (n,), m, w (k,)): n rows [A + B C, 0, D + B E], the loop without saturation, a row [C 0 E], k rows
-        [Z 0 0], and o rows [. 0 0] of what is watched.
+        [Z 0 0], and o rows [. 0 0] of what is watched; and where a signal has m itself in it, that of the mode.
     saturated
         The same with n rows [A B D].
     slewing, stopped
@@ -70,28 +71,36 @@ def compile_loop(
     without it, and what it changes is found in each step. Where nothing sets a step, ``idle_step`` seconds are one.
     ``slews`` says that the last two states are those of an actuator with a rate limit.
     """
-    now = loop.delays == 0
+    now, Z_m = loop.delays == 0, np.zeros(len(loop.delays)) if loop.Z_m is None else loop.Z_m
+    if loop.E[now] @ Z_m[now] != 0:
+        raise InputError("the control reaches itself at once, an algebraic loop; expected a dead time between")
     A, C = loop.A + loop.D[:, now] @ loop.Z[now], loop.C + loop.E[now] @ loop.Z[now]
-    D, E, Z, delays = _merged(loop)
-    brief = delays * max(_fastest(A, loop.B, C), _fastest(A + D @ Z, loop.B, C + E @ Z)) <= most_brief
+    B = loop.B + loop.D[:, now] @ Z_m[now]
+    D, E, Z, Z_m, delays = _merged(loop, Z_m)
+    brief = delays * max(_fastest(A, B, C), _fastest(A + D @ Z, B, C + E @ Z)) <= most_brief
+    brief &= Z_m == 0
     A, C = A + D[:, brief] @ Z[brief], C + E[brief] @ Z[brief]
     n, k = len(loop.x0), len(delays)
-    watched, groups, lags, reading = _watched(loop)
+    watched, watched_m, groups, lags, reading = _watched(loop)
     # what u - sat(u) drives is driven by zeros in the loop without saturation, and not by rounding
-    free_A, free_D = A + np.outer(loop.B, C), D + np.outer(loop.B, E)
-    states = np.vstack([Z, watched])
-    read = [np.concatenate([C, [0.0], E]), *np.hstack([states, np.zeros((len(states), 1 + k))])]
-    unsaturated = compressed(np.vstack([np.hstack([free_A, np.zeros((n, 1)), free_D]), *read]))
-    saturated = compressed(np.vstack([np.hstack([A, loop.B[:, None], D]), *read]))
+    free_A, free_D = A + np.outer(B, C), D + np.outer(B, E)
+    u, signals, signals_m = np.concatenate([C, [0.0], E]), np.vstack([Z, watched]), np.append(Z_m, watched_m)
+
+    def mode(A: np.ndarray, constant: np.ndarray, D: np.ndarray, m: np.ndarray) -> Rows:
+        """Where m is a row over (x, the constant, w)."""
+        read = np.hstack([signals, np.zeros((len(signals), 1 + k))]) + np.outer(signals_m, m)
+        return compressed(np.vstack([np.hstack([A, constant[:, None], D]), u, read]))
+
+    units = np.eye(n + 1 + k)
+    unsaturated, saturated = mode(free_A, np.zeros(n), free_D, u), mode(A, B, D, units[n])
     modes = [unsaturated, saturated]
     if slews:
         m, knows = np.eye(n)[-1], np.zeros(n) if loop.B_limits is None else loop.B_limits
-        moved = A + np.outer(loop.B - knows, m) + np.outer(m, np.eye(n)[-2])
+        moved = A + np.outer(B - knows, m) + np.outer(m, np.eye(n)[-2])
         free_A, free_D = moved + np.outer(knows, C), D + np.outer(knows, E)
-        modes.append(compressed(np.vstack([np.hstack([free_A, np.zeros((n, 1)), free_D]), *read])))
-        modes.append(compressed(np.vstack([np.hstack([moved, knows[:, None], D]), *read])))
+        modes += [mode(free_A, np.zeros(n), free_D, units[n - 1]), mode(moved, knows, D, units[n - 1])]
 
-    fastest = _fastest(A, loop.B, C)
+    fastest = _fastest(A, B, C)
     step = min(FURTHEST / fastest if fastest > 0 else np.inf, most_step)
     if not brief.all():
         shortest = float(delays[~brief].min())
@@ -124,23 +133,25 @@ def _fastest(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> float:
     return max(float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in (A, A + np.outer(B, C)))
 
 
-def _merged(loop: SaturatedLoop) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """D, E, Z and the dead times of the delayed signals that drive the loop, one for all that enter it alike."""
+def _merged(loop: SaturatedLoop, Z_m: np.ndarray) -> tuple[np.ndarray, ...]:
+    """D, E, Z, Z_m and the dead times of the delayed signals that drive the loop, one for all that enter it alike."""
     entering: dict[bytes, list[int]] = {}
     for j in range(len(loop.delays)):
-        if loop.delays[j] > 0 and loop.Z[j].any() and (loop.E[j] != 0 or loop.D[:, j].any()):
+        if loop.delays[j] > 0 and (Z_m[j] != 0 or loop.Z[j].any()) and (loop.E[j] != 0 or loop.D[:, j].any()):
             alike = np.array([loop.delays[j], loop.E[j], *loop.D[:, j]]) + 0.0  # of -0 and 0 one
             entering.setdefault(alike.tobytes(), []).append(j)
     first = [alike[0] for alike in entering.values()]
     Z = np.array([loop.Z[alike].sum(axis=0) for alike in entering.values()]).reshape(len(first), len(loop.x0))
-    return loop.D[:, first], loop.E[first], Z, loop.delays[first]
+    summed = np.array([Z_m[alike].sum() for alike in entering.values()])
+    return loop.D[:, first], loop.E[first], Z, summed, loop.delays[first]
 
 
-def _watched(loop: SaturatedLoop) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """What the outputs are made of: rows over x, where each group of them begins, its lag, and the outputs' rows."""
+def _watched(loop: SaturatedLoop) -> tuple[np.ndarray, ...]:
+    """Rows over x and m of what the outputs are made of, where each group begins, its lag, and the outputs' rows."""
     used = [j for j in range(len(loop.delays)) if any(w[j] != 0 for _, w in loop.outputs.values())]
     lags = sorted({0.0, *(float(loop.delays[j]) for j in used)})
     rows: list[np.ndarray] = []
+    direct: list[float] = []
     groups, own, delayed = [0], {}, {}
     for lag in lags:
         if lag == 0:
@@ -148,10 +159,12 @@ def _watched(loop: SaturatedLoop) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
                 if x.any():
                     own[name] = len(rows)
                     rows.append(x)
+                    direct.append(0.0)
         for j in used:
             if loop.delays[j] == lag:
                 delayed[j] = len(rows)
                 rows.append(loop.Z[j])
+                direct.append(0.0 if loop.Z_m is None else float(loop.Z_m[j]))
         groups.append(len(rows))
     reading = np.zeros((len(loop.outputs), len(rows)))
     for into, (name, (_, w)) in zip(reading, loop.outputs.items(), strict=True):
@@ -159,7 +172,8 @@ def _watched(loop: SaturatedLoop) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
             into[own[name]] = 1.0
         for j in used:
             into[delayed[j]] += w[j]
-    return np.array(rows).reshape(len(rows), len(loop.x0)), np.array(groups), np.array(lags), reading
+    states = np.array(rows).reshape(len(rows), len(loop.x0))
+    return states, np.array(direct), np.array(groups), np.array(lags), reading
 
 
 def _stacked(tables: Sequence[np.ndarray]) -> np.ndarray:

@@ -78,7 +78,7 @@ def integrate(
     limit = max(abs(low) if np.isfinite(low) else 0.0, abs(high) if np.isfinite(high) else 0.0)
     most_u, most_x = (DIVERGENT * limit, ENORMOUS) if limit > 0 else (np.inf, DIVERGENT)
     increments, polynomials = tables.increments, tables.polynomials
-    indptr, indices, data = unsaturated
+    indptr, indices, data = saturated  # what is not yet there is read of a standing actuator
     signals = len(indptr) - 1 - n
     most = polynomials.shape[1] // signals - 1
     values, sample = np.zeros((signals - k, samples.shape[1])), np.zeros(len(samples), np.int64)
@@ -98,7 +98,7 @@ def integrate(
     sizes, terms, later, negligible = np.zeros(len(z)), np.zeros(n), np.zeros(n), np.zeros(1 + k)
     work = np.zeros((2, most + 1))
     U, V = P[0], np.zeros((most + 1, n + 1 + k))
-    V[0, :n] = x0
+    V[0, :n], V[0, n] = x0, min(max(0.0, low), high)
     rest = np.array([times(indptr, indices, data, n + 1 + j, V, 0) for j in range(k)])
     remembered = Past(starts, lates, degrees, history, rest, queue)
     V[0, n + 1 :] = np.where(brief, 0.0, rest)
@@ -114,6 +114,7 @@ def integrate(
             for o in range(groups[g], groups[g + 1]):
                 values[1 + o, sample[g]] = times(indptr, indices, data, n + 1 + k + o, V, 0)
             sample[g] += 1
+    V[0, n] = 0.0
     t, late, reset, status, steps, usual = 0.0, 0.0, 0, COMPLETE, 0, 0  # the time is t + late, lest it drifts
 
     while t < horizon:

@@ -9,6 +9,7 @@ import numpy as np
 from design.blocks.block import Block
 from design.blocks.state_space import block_diagonal, realize
 from experiments.engine.saturated_loop import SaturatedLoop
+from identification.base.errors import InputError
 
 
 def pade_block(delay_s: float, order: int) -> Block:
@@ -34,6 +35,8 @@ def with_pade(loop: SaturatedLoop, order: int) -> SaturatedLoop:
     SaturatedLoop
         Without dead times; the approximations' states follow the loop's own.
     """
+    if loop.Z_m is not None and loop.Z_m.any():
+        raise InputError("a delayed signal jumps with the actuator; expected a plant with more poles than zeros")
     n = len(loop.x0)
     filters = {k: realize(pade_block(delay, order)) for k, delay in enumerate(loop.delays) if delay > 0}
     extra = order * len(filters)

@@ -40,7 +40,7 @@ NO_RESETS = Resets(np.zeros(0), np.zeros((0, 0)))
 
 @dataclass(frozen=True)
 class SaturatedLoop:
-    """x' = A x + B m + D w, u = C x + E w, m = sat(u), w_j(t) = Z_j x(t - delays_j).
+    """x' = A x + B m + D w, u = C x + E w, m = sat(u), w_j(t) = Z_j x(t - delays_j) + Z_m_j m(t - delays_j).
 
     Of an actuator with a rate limit m is its output, and x' = A x + (B - B_limits) m + B_limits sat(u) + D w.
 
@@ -50,7 +50,7 @@ class SaturatedLoop:
         Shapes (n, n), (n,), (n,). The reference is part of the state: it is generated, not sampled.
     D, E, Z, delays
         Shapes (n, k), (k,), (k, n), (k,); dead times in seconds, zero allowed. Before t = 0 every delayed
-        signal has the value that it has at t = 0.
+        signal has the value that it has at t = 0 with m = 0, or at the limit next to it.
     x0
         Initial state (n,).
     outputs
@@ -59,6 +59,8 @@ class SaturatedLoop:
         Of a reference that is generated piece by piece.
     B_limits
         Shape (n,): the part of B that follows sat(u) at once, and not a slower actuator; zeros unless given.
+    Z_m
+        Shape (k,): what the delayed signals have of m itself; zeros unless given.
     """
 
     A: np.ndarray
@@ -72,6 +74,7 @@ class SaturatedLoop:
     outputs: Mapping[str, tuple[np.ndarray, np.ndarray]]
     resets: Resets = NO_RESETS
     B_limits: np.ndarray | None = None
+    Z_m: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name in ("A", "B", "C", "D", "E", "Z", "x0"):

@@ -44,8 +44,8 @@ def whole(values: np.ndarray, centred: bool) -> np.ndarray:
     return np.asarray(grains * unit)
 
 
-def forced(cells: Cells, mu: np.ndarray, r: Samples, gain: float) -> float:
-    """A lower bound of the greatest |r - y| at the cells' ends that bear weights, for every |u| <= gain.
+def forced(cells: Cells, mu: np.ndarray, r: Samples, gain: float, shares: tuple[float, float] = (-1.0, 1.0)) -> float:
+    """A lower bound of the greatest |r - y| at the cells' ends that bear weights, for every u within its limits.
 
     Parameters
     ----------
@@ -60,16 +60,19 @@ def forced(cells: Cells, mu: np.ndarray, r: Samples, gain: float) -> float:
         The reference.
     gain
         In the unit of u over the scale of ``r``.
+    shares
+        The lower and the upper limit of u as shares of ``gain``, the larger size 1.
 
     Notes
     -----
     With the costates p of mu, h = p_{k+1} exp(A (t_{k+1} - t)) b in the cell that ends at t_{k+1}, and q_k the defects,
 
         |mu| max |r - y| >= sum mu_k (r - y)(t_k) >= sum mu_k r(t_k) - gain integral |h - m| dt - sum |q_k| |x_k|
-                            - |p_0 x_0|,
+                            - |p_0 x_0|
 
-    m any number where u has the mean zero, else 0; the last term is 0 where x starts from rest or is periodic. Of
-    means, h has mu_k (d + the integral of c exp(A s) b up to t_{k+1} - t) beside.
+    for |u| <= gain; with unequal limits half their distance stands for gain, and gain times their middle times the
+    integral of h - m is taken too. m is any number where u has the mean zero, else 0; the last term is 0 where x starts
+    from rest or is periodic. Of means, h has mu_k (d + the integral of c exp(A s) b up to t_{k+1} - t) beside.
     Within a cell h differs from its chord by at most 1/8 of its largest second derivative, in the mean by two thirds
     of that. Where it therefore keeps its sign its integral is known; elsewhere its chord's is, and the rest is added.
     """
@@ -95,13 +98,18 @@ def forced(cells: Cells, mu: np.ndarray, r: Samples, gain: float) -> float:
     second, fourth = (np.maximum(*np.abs(impulse[power] @ p.T)) for power in (2, 4))
     sixth = weight @ (np.abs(impulse[6]).max(axis=0) + powers[3] / 8)
     bend = (second + (fourth + sixth / 8) / 8) / 8 * SPARE + off
+    low, high = shares
+    half, middle = (high - low) / 2, (high + low) / 2
     if cells.start == "periodic" and cells.plant.integrators > 0:
-        middle = float(np.median(right))
-        left, right, area = left - middle, right - middle, area - middle
-        off = off + UNIT * (abs(middle) + np.abs(left) + np.abs(right) + np.abs(area))
+        m = float(np.quantile(right, high / (high - low)))
+        left, right, area = left - m, right - m, area - m
+        off = off + UNIT * (abs(m) + np.abs(left) + np.abs(right) + np.abs(area))
     keeps = (left * right > 0) & (np.minimum(np.abs(left), np.abs(right)) > bend + off)
     most = np.where(keeps, np.abs(area), absolute_integral(left, right) + 2 / 3 * bend) + off
-    taken = gain * (float(most.sum()) * (1 + len(most) * UNIT) + stray) * (1 + 8 * UNIT)
+    # each cell takes at most half its integral of |h - m| and middle times that of h - m, of which off is uncertain
+    most, sizes = half * most + middle * area, half * most + abs(middle) * (np.abs(area) + off)
+    uncertain = abs(middle) * float(off.sum()) + len(most) * UNIT * float(sizes.sum())
+    taken = gain * (float(most.sum()) + uncertain + stray) * (1 + 8 * UNIT)
     had = float(mu @ values) - len(mu) * UNIT * float(np.abs(mu) @ np.abs(values)) - doubt * size
     return (had - taken) / size - 4 * UNIT
 

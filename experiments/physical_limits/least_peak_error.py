@@ -1,9 +1,9 @@
-"""The smallest peak error that any controller, causal or not, can reach under a limited input, and what loops reach."""
+"""The smallest peak error that any controller, causal or not, can reach under a limited input."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -11,33 +11,28 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from design.design_file import Design
+from experiments.engine.simulate import limit_pair
 from experiments.physical_limits.intervals import Interval, outward
 from experiments.physical_limits.peak_program import REFINED, SPARE, PeakProgram
-from experiments.runs.compare_anti_windups import SETTLED, loops, run_all
-from experiments.runs.metrics import settling_time
+from experiments.runs.compare_anti_windups import SETTLED
 from experiments.runs.references import Reference
-from experiments.runs.steady_control import SAME
+from experiments.runs.steady_control import SAME, UNIT
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
-PERIODIC_STEPS = 400  # of a period
+PERIODIC_STEPS = 400, 1600  # of a period; the finer ones where the others leave more than
+NARROW = 2e-3  # of the reference's amplitude open
 STEPS = 200  # of a period from rest, for E(t0)
-FEWER_STEPS = 100  # of a period from rest, for the settling time alone
 HORIZON = 3  # periods from rest
 STARTS = 20  # most programs that trace E(t0)
 FALL = 1.1  # E(t0) is traced further where it may fall by more than this
 EVENLY = 16  # other t0 in a period
-RUN_PERIODS = 12
-SAMPLES_PER_PERIOD = 2000
-
-NEVER = Interval(math.nan, math.nan)
 
 Tick = Callable[[], object]
 
 
-def periodic_limit(plant: PlantModel, reference: Reference, limit: float) -> Interval:
-    """Enclose the least peak of |r - y| over all periodic u with |u| <= limit.
+def periodic_limit(plant: PlantModel, reference: Reference, limits: float | Sequence[float]) -> Interval:
+    """Enclose the least peak of |r - y| over all periodic u within the limits.
 
     Parameters
     ----------
@@ -46,8 +41,9 @@ def periodic_limit(plant: PlantModel, reference: Reference, limit: float) -> Int
     reference
         Periodic: its frequencies, 0 apart, are multiples of the slowest one, whose period u has. What is a multiple to
         1e-9 of itself is taken as one.
-    limit
-        Of the actuator, in its unit, positive and finite.
+    limits
+        Of the actuator, in its unit, (lower, upper), or one number for +-limits; finite, and on both sides of 0 where
+        the plant integrates.
 
     Returns
     -------
@@ -66,10 +62,18 @@ def periodic_limit(plant: PlantModel, reference: Reference, limit: float) -> Int
     the least peak is a (sqrt(1 - rho^2) - rho arccos(rho)): of a bounded slope, y is at its nearest to r half the
     greatest excess of |r(t1) - r(t2)| over the way K limit |t1 - t2| away.
     """
-    reference = _harmonic(plant, reference, limit)
-    if reference.required(plant).at_most <= limit:
+    reference, (low, high) = harmonic(plant, reference), finite_limits(plant, limits)
+    middle, half = (low + high) / 2, (high - low) / 2
+    rounding = 4 * UNIT * half if middle else 0.0
+    if reference.required(plant, middle).at_most <= half - rounding:
         return Interval(0.0, 0.0)
-    return PeakProgram(plant, reference.exact_period_s, PERIODIC_STEPS, periodic=True).solve(reference, limit)
+    found = Interval(0.0, math.inf)
+    for steps in PERIODIC_STEPS:
+        new = PeakProgram(plant, reference.exact_period_s, steps, periodic=True).solve(reference, (low, high))
+        found = Interval(max(found.lower, new.lower), min(found.upper, new.upper))
+        if found.upper - found.lower <= NARROW * reference.amplitude:
+            break
+    return found
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ class RestLimit:
 
     Parameters
     ----------
-    plant, reference, limit
+    plant, reference, limits
         As in :func:`periodic_limit`.
     steps
         In a period.
@@ -99,13 +103,14 @@ class RestLimit:
 
     plant: PlantModel
     reference: Reference
-    limit: float
+    limits: float | Sequence[float]
     steps: int = STEPS
     tick: Tick = lambda: None
     _solved: dict[int, Interval] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "reference", _harmonic(self.plant, self.reference, self.limit))
+        object.__setattr__(self, "reference", harmonic(self.plant, self.reference))
+        object.__setattr__(self, "limits", finite_limits(self.plant, self.limits))
 
     @property
     def horizon_s(self) -> float:
@@ -132,7 +137,8 @@ class RestLimit:
             return outward(max(known - doubt, later.lower), max(known + doubt + between, later.upper))
         if index not in self._solved:
             program = self._program
-            self._solved[index] = program.solve(self.reference, self.limit, index * program.part, self.plant.delay_s)
+            limits = limit_pair(self.limits)
+            self._solved[index] = program.solve(self.reference, limits, index * program.part, self.plant.delay_s)
             self.tick()
         return self._known(index)
 
@@ -200,82 +206,7 @@ class RestLimit:
         return PeakProgram(self.plant, self.reference.exact_period_s * steps / self.steps, steps, periodic=False)
 
 
-def limits_tables(
-    design: Design, reference: Reference, limits: Sequence[float], tick: Tick = lambda: None
-) -> dict[str, pd.DataFrame]:
-    """What the runs without and with anti-windup leave to gain, under several limits.
-
-    Parameters
-    ----------
-    design
-        Of either kind.
-    reference
-        Periodic, see :func:`periodic_limit`.
-    limits
-        Of the actuator, +-limit each.
-    tick
-        Called after every program and after every set of runs.
-
-    Returns
-    -------
-    dict
-        ``limits_KIND``, a row for each limit, ascending: limit, required (the most that the control of perfect
-        tracking reaches), periodic_lower, periodic_upper; settling_lower_s, settling_upper_s (from rest, see
-        :meth:`RestLimit.settling`, to within 1 % of the reference's amplitude); and for every run NAME peak_NAME
-        (greatest |error| over the last of twelve periods), settling_NAME_s (to the same band), ratio_NAME (peak_NAME
-        over periodic_lower). Cells are empty for what never settles, diverges, or would be divided by zero.
-        ``limits_KIND_summary`` for the first limit: limit, start_s,
-        rest_lower, rest_upper (see :class:`RestLimit`) and tail_NAME, the greatest |error| of the run from start_s
-        to the horizon of three periods.
-
-    Raises
-    ------
-    InputError
-        A limit is not positive and finite, or see :func:`periodic_limit`.
-    """
-    plant, name = design.loop_plant, design.kind.replace("-", "_")
-    required = reference.required(plant).value
-    for limit in limits:
-        _harmonic(plant, reference, limit)
-    rest = RestLimit(plant, reference, limits[0], tick=tick)
-    summary = rest.table().assign(limit=limits[0])
-    evenly = np.linspace(0.0, RUN_PERIODS * reference.period_s, RUN_PERIODS * SAMPLES_PER_PERIOD + 1)
-    time_s, every, rows = np.union1d(evenly, summary["start_s"]), loops(design, reference), []
-    for limit in sorted(set(limits)):
-        runs = run_all(every, limit, time_s)
-        tick()
-        errors = {run: np.abs(result.outputs["error"]) for run, result in runs.items()}
-        rows.append({"limit": limit, "required": required} | _row(plant, reference, limit, time_s, errors, tick))
-        if limit == limits[0]:
-            counted = time_s <= rest.horizon_s
-            for run, error in errors.items():
-                tails = np.maximum.accumulate(error[counted][::-1])[::-1]
-                summary[f"tail_{run}"] = tails[np.searchsorted(time_s, summary["start_s"])]
-    return {f"limits_{name}": pd.DataFrame(rows), f"limits_{name}_summary": summary}
-
-
-def _row(
-    plant: PlantModel,
-    reference: Reference,
-    limit: float,
-    time_s: np.ndarray,
-    errors: Mapping[str, np.ndarray],
-    tick: Tick,
-) -> dict[str, float]:
-    band, periodic, settled = SETTLED * reference.amplitude, periodic_limit(plant, reference, limit), NEVER
-    tick()
-    if periodic.lower <= band:
-        settled = RestLimit(plant, reference, limit, FEWER_STEPS, tick).settling(band)
-    row = {"periodic_lower": periodic.lower, "periodic_upper": periodic.upper}
-    row |= {"settling_lower_s": settled.lower, "settling_upper_s": settled.upper}
-    for run, error in errors.items():
-        row[f"peak_{run}"] = peak = float(error[time_s >= time_s[-1] - reference.period_s].max())
-        row[f"settling_{run}_s"] = settling_time(time_s, error, band) if peak <= band else math.nan
-        row[f"ratio_{run}"] = peak / periodic.lower if periodic.lower > 0 else math.nan
-    return row
-
-
-def _harmonic(plant: PlantModel, reference: Reference, limit: float) -> Reference:
+def harmonic(plant: PlantModel, reference: Reference) -> Reference:
     """The reference with frequencies that are multiples of the slowest; refuses what :func:`periodic_limit` does."""
     if plant.unstable_poles:
         fastest = max(pole.real for pole in plant.unstable_poles)
@@ -285,8 +216,8 @@ def _harmonic(plant: PlantModel, reference: Reference, limit: float) -> Referenc
         )
     if not (plant.pole_modes or plant.real_poles or plant.integrators > 0):
         raise InputError(
-            f"the plant is the gain {plant.gain:.4g}, whose least error is the largest |r| less {abs(plant.gain):.4g} "
-            "times the limit; expected a plant with a pole"
+            f"the plant is the gain {plant.gain:.4g}, whose least error is that by which r leaves so many times the "
+            "limits; expected a plant with a pole"
         )
     if reference.slope:
         raise InputError(f"the reference has the slope {reference.slope:g} a second; expected a periodic one")
@@ -296,6 +227,17 @@ def _harmonic(plant: PlantModel, reference: Reference, limit: float) -> Referenc
     if not math.isfinite(slowest) or not all(near):
         said = ", ".join(f"{omega:.6g}" for omega in reference.omegas)
         raise InputError(f"the reference has the frequencies {said} rad/s; expected multiples of a slowest one above 0")
-    if not (math.isfinite(limit) and limit > 0):
-        raise InputError(f"the limit is {limit:g}; expected a positive finite number")
     return replace(reference, omegas=tuple(k * slowest for k in harmonics))
+
+
+def finite_limits(plant: PlantModel, limits: float | Sequence[float]) -> tuple[float, float]:
+    """The lower and the upper limit; refuses what :func:`periodic_limit` does."""
+    low, high = limit_pair(limits)
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise InputError(f"the saturation limits are {low:g} and {high:g}; expected finite ones")
+    if plant.integrators > 0 and not low < 0 < high:
+        raise InputError(
+            f"the saturation limits are {low:g} and {high:g}, between which a plant with an integrator drifts; "
+            "expected 0 between them"
+        )
+    return low, high

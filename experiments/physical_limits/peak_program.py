@@ -20,15 +20,16 @@ from experiments.runs.references import Reference
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
-SAMPLES = 4  # times in a step at which the program knows the error
+SAMPLES = 4  # times in a step at which the program knows the error; one, its middle, of a plant whose output jumps
 REFINED = 4  # parts of a step, each with a value of u of its own, near the time from which the error counts
 NEAR = (20, 2)  # steps before and after that time that are refined
 PHASE = 0.3  # most that the fastest pole turns or decays within a cell, rad
 WIDTHS = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0)  # of the averages that are tried, in steps
 PASSES = 3  # three boxes in a row are a smooth bell
 SPARE = 6  # steps at the end of a start from rest that only serve the averages
-LOST = 1e-3  # of the weights: so many may lie beyond the time to which the error counts
+LOST = 1e-3  # of the weights may lie beyond the time to which the error counts, or that much of r is hardly an error
 MOST_CELLS = 2_000_000
+GRAIN = 1e-8  # of the distance of the limits, more than a grain in so many cells
 # the first is the fastest, the others seldom fail
 ATTEMPTS: tuple[tuple[Literal["highs-ipm", "highs-ds"], bool], ...] = (
     ("highs-ipm", True),
@@ -39,7 +40,7 @@ ATTEMPTS: tuple[tuple[Literal["highs-ipm", "highs-ds"], bool], ...] = (
 
 @dataclass(frozen=True)
 class PeakProgram:
-    """min over u, |u| <= limit, of the greatest |r(t) - y(t)| from a given time on, y the output of a plant.
+    """min over u, low <= u <= high, of the greatest |r(t) - y(t)| from a given time on, y the output of a plant.
 
     Parameters
     ----------
@@ -110,15 +111,17 @@ class PeakProgram:
         """Ends of the cells, shape (cells + 1,); of a periodic program without the last, (cells,)."""
         return np.arange(self.steps * self.fineness + (not self.periodic)) * self.cell_s
 
-    def solve(self, reference: Reference, limit: float, first: int = 0, ahead_s: float = 0.0) -> Interval:
+    def solve(
+        self, reference: Reference, limits: tuple[float, float], first: int = 0, ahead_s: float = 0.0
+    ) -> Interval:
         """Enclose the least peak error.
 
         Parameters
         ----------
         reference
             r; if the program is periodic, of its period.
-        limit
-            Of |u|, positive.
+        limits
+            The lower and the upper one of u, in order; 0 between them where the plant integrates.
         first
             Index into ``time_s`` from which on the error counts, a multiple of ``part``; 0 if periodic.
         ahead_s
@@ -127,7 +130,7 @@ class PeakProgram:
         Returns
         -------
         Interval
-            In the unit of y. No measurable u with |u| <= limit stays below ``lower``; some u reaches ``upper``. Both
+            In the unit of y. No measurable u within the limits stays below ``lower``; some u reaches ``upper``. Both
             are bounds of the plant and the reference as their numbers say, all roundings included, that of a table to
             12 digits too.
 
@@ -151,16 +154,18 @@ class PeakProgram:
             values = values - (values.max() + values.min()) / 2
         scale = float(np.abs(values).max()) or 1.0
         doubt = reference.rounding(float(self.span_s) + ahead_s) / scale + 4 * UNIT
-        r, gain = Samples(values / scale, doubt, reference.bend * self.cell_s**2 / 8 / scale), limit / scale
-        u, mu = self._optimum(r.values, gain, slice(first, len(values)))
-        weighed = slice(first, self.counted - (self._cells.jumps and not self.periodic))
-        if np.abs(mu[weighed.stop :]).sum() > LOST * np.abs(mu).sum():
-            _, mu = self._optimum(r.values, gain, weighed)
+        r, size = Samples(values / scale, doubt, reference.bend * self.cell_s**2 / 8 / scale), max(map(abs, limits))
+        gain, shares = size / scale, (limits[0] / size, limits[1] / size)
+        u, mu = self._optimum(r.values, gain, shares, slice(first, len(values)))
         cells, more = self._cells, gain * (1 + 2 * UNIT)
         controls = (whole(self._average(u, width, first), self._centred) for width in WIDTHS)
-        uppers = [reached(cells, control, r, more, counted) for control in controls]
-        lowers = [forced(cells, self._weights(mu, width, weighed), r, more) for width in WIDTHS] if mu.any() else [0.0]
-        return outward(scale * max(0.0, *lowers), scale * min(uppers))
+        upper = min(reached(cells, control, r, more, counted) for control in controls)
+        weighed = slice(first, self.counted - (cells.jumps and not self.periodic))
+        if upper > LOST and np.abs(mu[weighed.stop :]).sum() > LOST * np.abs(mu).sum():
+            _, mu = self._optimum(r.values, gain, shares, weighed)
+        weights = [self._weights(mu, width, weighed) for width in WIDTHS] if mu[weighed].any() else []
+        lowers = [forced(cells, each, r, more, shares) for each in weights]
+        return outward(scale * max([0.0, *lowers]), scale * upper)
 
     def _weights(self, mu: np.ndarray, width: float, counted: slice) -> np.ndarray:
         """Averaged weights for :func:`experiments.physical_limits.certificates.forced`, none at the end of the span."""
@@ -176,11 +181,17 @@ class PeakProgram:
         before, after = (steps * self.fineness for steps in NEAR)
         return np.union1d(whole, parts[(parts >= first - before) & (parts <= first + after)])
 
-    def _optimum(self, r: np.ndarray, gain: float, counted: slice) -> tuple[np.ndarray, np.ndarray]:
-        """Solve the program: u in every cell, as a share of its limit, and the weights of e at the cells' ends.
+    def _optimum(
+        self, r: np.ndarray, gain: float, shares: tuple[float, float], counted: slice
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Solve the program: u in every cell, as a share of the farther limit, and the weights of e at the cells' ends.
 
-        The variables are the states at the steps' ends (but for the start from rest), u in the steps, the peak.
+        The variables are the states at the steps' ends (but for the start from rest), u in the steps, the peak. A limit
+        that is no whole number of grains, see :func:`experiments.physical_limits.certificates.whole`, is kept off by
+        one and more.
         """
+        off = GRAIN * (shares[1] - shares[0])
+        low, high = shares[0] + off * (shares[0] != -1), shares[1] - off * (shares[1] != 1)
         c, d, n, jumps = self._cells.chain.c[None, :], self._cells.chain.d, len(self._cells.chain.b), self._cells.jumps
         edges = self._edges(counted.start)
         lengths = np.diff(edges)
@@ -211,7 +222,7 @@ class PeakProgram:
         both: Any = sparse.vstack([sparse.hstack([output, peak]), sparse.hstack([-output, peak])])
         control = slice(output.shape[1] - steps, output.shape[1])
         bounds: Any = np.full((output.shape[1] + 1, 2), [-np.inf, np.inf])
-        bounds[control] = -1.0, 1.0
+        bounds[control] = low, high
         for method, presolve in ATTEMPTS:
             solution = linprog(
                 np.append(np.zeros(output.shape[1]), 1.0),
@@ -230,13 +241,14 @@ class PeakProgram:
                 "the linear program of the least error was not solved; expected a limit nearer to the control that the "
                 f"reference takes (the solver says: {' '.join(str(solution.message).split())})"
             )
-        u, prices = np.clip(np.asarray(solution.x)[control], -1.0, 1.0), np.asarray(solution.ineqlin.marginals)
+        u, prices = np.clip(np.asarray(solution.x)[control], low, high), np.asarray(solution.ineqlin.marginals)
         weights = prices[: len(judged)] - prices[len(judged) :]
         if self._centred:
             u, weights = u - u.mean(), weights - weights.mean()
+            u = u / max(1.0, u.min() / low, u.max() / high)
         mu = np.zeros(len(r))
         mu[sampled] = weights
-        return np.repeat(u / max(1.0, np.abs(u).max()), lengths), mu
+        return np.repeat(u, lengths), mu
 
     def _over(self, cells: int) -> tuple[np.ndarray, np.ndarray]:
         """What becomes of the states in so many cells, by themselves and under u = 1."""

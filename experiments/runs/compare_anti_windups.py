@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ import pandas as pd
 from design.anti_windup.compensator import AntiWindup
 from design.design_file import Design
 from experiments.engine.saturated_loop import SaturatedLoop
-from experiments.engine.simulate import DivergenceError, Run, simulate
+from experiments.engine.simulate import DivergenceError, Run, limit_pair, simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.guarantee import guarantee
 from experiments.runs.metrics import last_saturation, over_last, settling_time
@@ -38,8 +38,8 @@ def span(design: Design, reference: Reference) -> float:
     return 2 * design.corrected.judgement.recovery_s
 
 
-def run_all(loops: Mapping[str, SaturatedLoop], limit: float, time_s: np.ndarray) -> dict[str, Run]:
-    """Simulate every loop under sat with +-limit; one that diverges has NaN from there on.
+def run_all(loops: Mapping[str, SaturatedLoop], limit: float | Sequence[float], time_s: np.ndarray) -> dict[str, Run]:
+    """Simulate every loop under sat with its limits, one number for +- that; one that diverges has NaN from there on.
 
     An unstable controller (the H-infinity optimum may be one) diverges exponentially once the actuator has
     saturated and no anti-windup holds it: that is a result, and it must not hide the other runs.
@@ -47,14 +47,15 @@ def run_all(loops: Mapping[str, SaturatedLoop], limit: float, time_s: np.ndarray
     return {name: _run(loop, limit, time_s) for name, loop in loops.items()}
 
 
-def _run(loop: SaturatedLoop, limit: float, time_s: np.ndarray) -> Run:
+def _run(loop: SaturatedLoop, limit: float | Sequence[float], time_s: np.ndarray) -> Run:
+    limits = limit_pair(limit)
     try:
-        return simulate(loop, (-limit, limit), time_s)
+        return simulate(loop, limits, time_s)
     except DivergenceError as error:
         before = time_s[time_s < error.time_s]
         if len(before) < 2:
             raise
-        part = simulate(loop, (-limit, limit), before)
+        part = simulate(loop, limits, before)
         rest = np.full(len(time_s) - len(before), np.nan)
         return replace(
             part,

@@ -35,8 +35,8 @@ def design_loop(
     anti_windup
         theta1~ with 1 + theta1~, or its name in the design; None takes theta1 and theta2 out of the loop.
     plant
-        The true plant, with at least one pole more than zeros; the design's own model unless given. The controller
-        keeps the model in F, K and theta2, dead time and all.
+        The true plant; the design's own model unless given. Of as many zeros as poles it has a dead time, or a
+        controller that is strictly proper. The controller keeps the model in F, K and theta2, dead time and all.
     disturbances
         At the plant's input and output, and noise.
 
@@ -111,10 +111,15 @@ def plant_loop(
     Raises
     ------
     InputError
-        The plant has as many zeros as poles.
+        The plant has as many zeros as poles and no dead time, and the controller passes the error on at once; or the
+        design's own model has as many zeros as poles.
     """
-    if plant.relative_degree < 1:
-        raise InputError("the true plant has as many zeros as poles; expected more poles, or the loop is algebraic")
+    if plant.relative_degree < 1 and not plant.delay_s and controller.forward.d[0]:
+        raise InputError(
+            "the true plant has as many zeros as poles and no dead time; expected more poles, or the loop is algebraic"
+        )
+    if controller.theta.d.any():
+        raise InputError("the design's model has as many zeros as poles; expected more poles, for its theta2")
     P = realize(plant_block(plant))
     delays = np.array([plant.delay_s, controller.delay_s, controller.delay_s])
     return _assemble(P, controller.forward, controller.feedback, controller.theta, reference, disturbances, delays)
@@ -146,8 +151,8 @@ def _assemble(
             full[places[name]] = part
         return full
 
-    # w = (y, y_d, [T_so v] delayed), each a function of the states only: P, theta2 and T_so are strictly proper
-    Z = np.stack([row(P=P.C[0]), row(theta=theta.C[1]), row(T=feedback.C[0])])
+    # w = (y, y_d, [T_so v] delayed), functions of the states, but for what y has of m where P is not strictly proper
+    Z = np.stack([row(P=P.C[0], r=P.d[0] * added["input"]), row(theta=theta.C[1]), row(T=feedback.C[0])])
     r, d, measured = (row(r=x) for x in (generator.row, added["output"], added["output"] + added["noise"]))
     e_x, e_w = r - measured, np.array([-1.0, -1.0, 0.0])
     v_x = row(K=forward.C[0]) + forward.d[0] * e_x
@@ -185,4 +190,5 @@ def _assemble(
         | ({"measured": (measured, y)} if disturbances.noise else {}),
         resets=generator.resets,
         B_limits=-row(theta=theta.b),
+        Z_m=np.array([P.d[0], 0.0, 0.0]),
     )

@@ -25,7 +25,8 @@ class Disturbances:
     Parameters
     ----------
     input
-        Added to what the actuator gives out, in its unit, before the plant's dead time.
+        Added to what the actuator gives out, in its unit, before the plant's dead time. What passes a plant of as many
+        zeros as poles at once was, in continuous time, before t = 0 what it is then.
     output
         Added to what the plant gives out, in the plant's output unit: it is part of y.
     noise

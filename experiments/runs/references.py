@@ -82,6 +82,12 @@ class Reference:
         return float(sum(abs(a) * omega**2 for a, omega in zip(self.amplitudes, self.omegas, strict=True)) * (1 + 1e-9))
 
     @property
+    def constants(self) -> tuple[float, ...]:
+        """The offset, and the sinusoids of frequency 0, in the plant's output unit."""
+        parts = zip(self.amplitudes, self.omegas, self.phases_rad, strict=True)
+        return (self.offset, *(a * math.sin(phase) for a, omega, phase in parts if omega == 0))
+
+    @property
     def amplitude(self) -> float:
         """The sum of the amplitudes' sizes, in the plant's output unit: the scale of every band.
 
@@ -100,18 +106,18 @@ class Reference:
         """:attr:`period_s`, which is finite, to 80 digits."""
         return 2 * PI / Fraction(min(omega for omega in self.omegas if omega > 0))
 
-    def required(self, plant: PlantModel) -> Peak:
-        """The most that the control reaches which keeps the plant's output on r in the steady state, in its input unit.
+    def required(self, plant: PlantModel, middle: float = 0.0) -> Peak:
+        """The most that the control which keeps the plant's output on r in the steady state is away from ``middle``.
 
-        It is the control (r/P)(t) = sum of amplitude_i/|P(j omega_i)| sin(omega_i t + phase_i - arg P(j omega_i)) and
-        what r's constant and slope take, see :func:`experiments.runs.steady_control.steady_constant`; infinite where
-        that grows for ever. See :func:`experiments.runs.steady_control.peak`.
+        In the plant's input unit. It is the control (r/P)(t) = sum of amplitude_i/|P(j omega_i)| sin(omega_i t +
+        phase_i - arg P(j omega_i)) and what r's constant and slope take, see
+        :func:`experiments.runs.steady_control.steady_constant`; infinite where that grows for ever. See
+        :func:`experiments.runs.steady_control.peak`.
         """
         parts = list(zip(self.amplitudes, self.omegas, self.phases_rad, strict=True))
-        constants = [self.offset, *(a * math.sin(phase) for a, omega, phase in parts if omega == 0)]
-        constant = steady_constant(plant, math.fsum(constants), self.slope)
-        doubt = steady_constant(plant, 4 * UNIT * sum(map(abs, constants)), 0.0)
-        return peak([response(plant, *part) for part in parts if part[1] > 0], constant, abs(doubt))
+        constant = steady_constant(plant, math.fsum(self.constants), self.slope)
+        doubt = steady_constant(plant, 4 * UNIT * sum(map(abs, self.constants)), 0.0)
+        return peak([response(plant, *part) for part in parts if part[1] > 0], constant - middle, abs(doubt))
 
     def generator(self) -> Generator:
         """Its oscillators, and a constant with its integral."""

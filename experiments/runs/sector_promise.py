@@ -32,7 +32,7 @@ from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import Run, simulate
 from experiments.runs.guarantee import Guarantee, sector_text
 from experiments.runs.references import Reference, SampledReference
-from experiments.runs.steady_control import response
+from experiments.runs.steady_control import response, steady_constant
 from experiments.runs.windup_bound import Windup, windup_of_run
 from identification.base.digits import told_apart
 from identification.model.plant import PlantModel
@@ -137,20 +137,20 @@ def steady_control(reference: Reference | SampledReference, plant: PlantModel, t
     Parameters
     ----------
     reference
-        r(t); a sampled one ends as a constant, which takes no control of a plant that integrates.
+        r(t); a sampled one ends as a constant.
     plant
-        The true plant, with one integrator.
+        The true plant.
     time_s
         Shape (s,).
 
     Returns
     -------
     ndarray, shape (s,)
-        The sinusoids over P(j omega), and slope/gain.
+        The sinusoids over P(j omega), and :func:`experiments.runs.steady_control.steady_constant`.
     """
     if isinstance(reference, SampledReference):
-        return np.zeros(len(time_s))
-    steady = np.full(len(time_s), reference.slope / plant.gain)
+        return np.full(len(time_s), steady_constant(plant, float(reference.values[-1]), 0.0))
+    steady = np.full(len(time_s), steady_constant(plant, math.fsum(reference.constants), reference.slope))
     for amplitude, omega, phase in zip(reference.amplitudes, reference.omegas, reference.phases_rad, strict=True):
         if omega > 0:
             wave = response(plant, amplitude, omega, phase)

@@ -122,7 +122,7 @@ def limits(design: Path, output: Path) -> None:
     from tqdm import tqdm
 
     from design.design_file import read_design
-    from experiments.physical_limits.least_peak_error import limits_tables
+    from experiments.physical_limits.limits_tables import limits_tables
     from experiments.thesis.printed_choices import thesis_reference
     from experiments.thesis.studies.conditions import several_limits
 

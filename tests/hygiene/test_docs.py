@@ -22,6 +22,7 @@ ROOMS = ("identification", "design", "experiments", "paper_figures")
         ("anti_windup.md", 8),
         ("outside_the_class.md", 7),
         ("campaigns.md", 4),
+        ("designs.md", 12),
         ("closed_loop.md", 8),
         ("errata.md", 30),
         ("unprinted_conditions.md", 3),

@@ -119,9 +119,10 @@ class Units:
         )
 
     def compensator(self, of: Compensator) -> Compensator:
-        """Times of the thesis's, bandwidth and f of the corrected one, and of each f, where and the recovery."""
+        """Times of the thesis's, bandwidth, f and certificate of the corrected one; of each f, where and recovery."""
         factors = {"alpha": self.time, "beta": self.time, "bandwidth": 1 / self.time, "f_lower": abs(self.gain)}
-        judged = of.judgement
+        judged, rows = of.judgement, getattr(of, "certificate", None)
+        certificate = {} if rows is None else {"certificate": tuple(tuple(self.time * P for P in row) for row in rows)}
         return replace(
             of,
             kind=AntiWindup(self.block(of.kind.theta1_tilde), self.block(of.kind.one_plus)),
@@ -132,6 +133,7 @@ class Units:
                 recovery_s=judged.recovery_s * self.time,
             ),
             **{name: getattr(of, name) * factor for name, factor in factors.items() if hasattr(of, name)},
+            **certificate,
         )
 
     def parameters(self, of: DelayFreeParameters | ExtendedParameters) -> DelayFreeParameters | ExtendedParameters:

@@ -128,3 +128,25 @@ def test_steps_that_are_none(levels: list[tuple[float, float]], part: str) -> No
 def test_noise_that_is_none(arguments: tuple[float, float, int, float]) -> None:
     with pytest.raises(InputError, match="the noise has"):
         noise(*arguments)
+
+
+@pytest.mark.parametrize("rate_limit", [np.inf, 200.0])
+def test_a_true_plant_that_jumps_a_dead_time_later(extended_design: Design, rate_limit: float) -> None:
+    """With as many zeros as poles: the transfer functions' response without limits, the sampled loop's under them."""
+    plant = replace(extended_design.plant, real_zeros=(900.0,) * extended_design.plant.relative_degree)
+    reference, disturbances = sinusoid(20.0, 1.5, 0.3), Disturbances(input=steps([(2.0, 0.2)]))
+    loop, errors = design_loop(extended_design, reference, "corrected", plant, disturbances), []
+    for rate in (1000.0, 16000.0):
+        drive = Drive(rate, "tustin", (-8.0, 9.0), slew=rate_limit)
+        run = simulate_sampled(extended_design, reference, "corrected", drive, 0.7, plant, disturbances=disturbances)
+        exact = simulate(loop, (-8.0, 9.0), run.time_s, rate=rate_limit)
+        errors.append(np.quantile(np.abs(run.output - exact.outputs["output"]), 0.95))
+    assert np.abs(exact.control).max() > 9.0
+    assert errors[1] < 0.2 * errors[0] < 0.02
+
+    omega, times = 2.0, np.linspace(0.0, 36.0, 1201)
+    loop = design_loop(extended_design, REST, None, plant, Disturbances(input=sinusoid(1.0, omega)))
+    late, s = times > 32.0, np.array([1j * omega])
+    C, P = parts(extended_design, omega)[1], complex(plant(s)[0])
+    expected = (P / (1 + P * C) * np.exp(1j * omega * times)).imag
+    np.testing.assert_allclose(simulate(loop, FREE, times).outputs["output"][late], expected[late], atol=1e-7)

@@ -16,11 +16,15 @@ from held_plant import PLANTS, held_response
 
 from design.design_file import Design
 from experiments.__main__ import main
+from experiments.engine.simulate import simulate
 from experiments.physical_limits import least_peak_error
+from experiments.physical_limits import limits_tables as module
 from experiments.physical_limits.certificates import Samples, reached, whole
 from experiments.physical_limits.intervals import Interval
-from experiments.physical_limits.least_peak_error import RestLimit, limits_tables, periodic_limit
+from experiments.physical_limits.least_peak_error import RestLimit, periodic_limit
+from experiments.physical_limits.limits_tables import limits_tables
 from experiments.physical_limits.peak_program import PeakProgram
+from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference, sinusoid
 from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies.conditions import several_limits
@@ -164,7 +168,7 @@ def test_no_held_input_betters_the_floor_and_the_optimum_reaches_what_it_says(na
     limit = 0.9 * reference.required(plant).value
     program = PeakProgram(plant, Fraction(2 * period), 120, periodic=False)
     r, first = reference(program.time_s), 30 * program.fineness
-    interval = program.solve(reference, limit, first)
+    interval = program.solve(reference, (-limit, limit), first)
     counted = slice(first, program.counted)
 
     def peak(u: np.ndarray) -> float:
@@ -178,7 +182,7 @@ def test_no_held_input_betters_the_floor_and_the_optimum_reaches_what_it_says(na
     for trial in range(6):
         pushed = tracker * (1 + trial / 4) + limit * trial / 4 * np.sin(rng.uniform(1, 40) * middle)
         assert peak(np.clip(pushed, -limit, limit)) >= interval.lower
-    u, _ = program._optimum(r / 3.0, limit / 3.0, slice(first, len(r)))
+    u, _ = program._optimum(r / 3.0, limit / 3.0, (-1.0, 1.0), slice(first, len(r)))
     assert np.abs(u).max() <= 1.0
     cells, samples = program._cells, Samples(r / 3.0, 1e-15, 0.0)
     claimed = 3.0 * reached(cells, whole(u, centred=False), samples, limit / 3.0, counted)
@@ -237,20 +241,32 @@ def test_table_of_the_start_from_rest_falls_and_is_finest_where_it_falls() -> No
 @pytest.mark.parametrize(
     ("plant", "reference", "limit", "words"),
     [
-        (PlantModel(1.0, (Mode(3.0, 0.1),), (Mode(5.0, 0.1),), 0.0, 0), CHAPTER_4, 1.0, "as many zeros as poles"),
+        (PlantModel(-2.0, (), (), 0.1, 0), CHAPTER_4, 1.0, "the plant is the gain -2, whose least error"),
+        (PlantModel(1.0, (), (Mode(5.0, -0.1),), 0.0, 0), CHAPTER_4, 1.0, "of real part 0.5 rad/s; expected none"),
+        (integrator(1.0), CHAPTER_4, (2.0, -3.0), "limits are 2 and -3; expected the lower one first"),
+        (integrator(1.0), CHAPTER_4, (0.0, 3.0), "limits are 0 and 3, between which a plant with an integ"),
         (integrator(1.0), sinusoid(1.0, 0.0, 0.0, 1.0), 1.0, "a slowest one above 0"),
         (integrator(1.0), Reference((1.0, 1.0), (2.0, 3.0), (0.0, 0.0), 0.0), 1.0, "frequencies 2, 3 rad/s"),
-        (integrator(1.0), CHAPTER_4, 0.0, "the limit is 0; expected a positive finite number"),
-        (integrator(1.0), CHAPTER_4, math.inf, "the limit is inf"),
-        (integrator(1.0), CHAPTER_4, math.nan, "the limit is nan"),
+        (integrator(1.0), CHAPTER_4, 0.0, "the saturation limit is 0; expected a positive number"),
+        (integrator(1.0), CHAPTER_4, math.inf, "limits are -inf and inf; expected finite ones"),
+        (integrator(1.0), CHAPTER_4, math.nan, "the saturation limit is nan"),
         (PlantModel(1.0, (), (), 0.0, 1, (), (1e9,)), CHAPTER_4, 1.0, "1e\\+09 rad/s, is too fast beside"),
     ],
 )
-def test_refusals(plant: PlantModel, reference: Reference, limit: float, words: str) -> None:
+def test_refusals(plant: PlantModel, reference: Reference, limit: float | tuple[float, float], words: str) -> None:
     with pytest.raises(InputError, match=words):
         periodic_limit(plant, reference, limit)
     with pytest.raises(InputError, match=words):
         RestLimit(plant, reference, limit).at(0)
+
+
+def test_an_actuator_of_one_sign_on_a_plant_that_follows_at_once() -> None:
+    """y = K u, 0 <= u <= 2: of r between -2 and 4 the error is 2 below, and nothing more above than K = 1.5 leaves."""
+    lag, reference = PlantModel(1.5, (), (), 0.0, 0, (), (4e3,)), sinusoid(3.0, 1.0, 0.0, 1.0)
+    for limits, exact in (((0.0, 2.0), 2.0), ((-1.5, 2.0), 1.0), ((-1.5, 2.7), 0.0)):
+        holds(periodic_limit(lag, reference, limits), exact, 0.01)
+    mirrored = sinusoid(-3.0, 1.0, 0.0, -1.0)
+    assert periodic_limit(lag, mirrored, (-2.0, 1.5)).lower == pytest.approx(1.0, rel=0.01)
 
 
 @pytest.mark.parametrize("band", [0.0, math.nan])
@@ -262,8 +278,9 @@ def test_band_must_be_positive(band: float) -> None:
 @pytest.fixture(scope="module")
 def tables(extended_design: Design) -> dict[str, pd.DataFrame]:
     patch = pytest.MonkeyPatch()
-    for name, value in {"STEPS": 50, "FEWER_STEPS": 40, "STARTS": 4, "RUN_PERIODS": 4}.items():
-        patch.setattr(least_peak_error, name, value)
+    patch.setattr(least_peak_error, "STARTS", 4)
+    patch.setattr(module, "FEWER_STEPS", 40)
+    patch.setattr(module, "RUN_PERIODS", 4)
     found = limits_tables(extended_design, thesis_reference("extended", (1.5,)), [12.5, 9.5])
     patch.undo()
     return found
@@ -293,10 +310,27 @@ def test_rows_are_ascending_and_the_summary_is_for_the_first_limit(tables: dict[
     assert 0.42 < rows["settling_lower_s"][1] <= rows["settling_upper_s"][1] < 0.48
 
 
+def test_rows_of_unequal_limits(delay_free_design: Design, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Solved without a program; the runs are those under the same limits."""
+    monkeypatch.setattr(module, "periodic_limit", lambda *_: Interval(9.0, 9.0))
+    monkeypatch.setattr(module, "RUN_PERIODS", 2)
+    monkeypatch.setattr(RestLimit, "at", lambda *_: Interval(1.0, 2.0))
+    monkeypatch.setattr(RestLimit, "_known", lambda *_: Interval(1.0, 2.0))
+    reference = thesis_reference("delay-free", delay_free_design.reference_omegas)
+    found = limits_tables(delay_free_design, reference, [(-9.0, 12.0), 10.0])
+    rows, summary = found["limits_delay_free"], found["limits_delay_free_summary"]
+    assert rows[["lower_limit", "limit"]].to_numpy().tolist() == [[-10.0, 10.0], [-9.0, 12.0]]
+    assert summary["lower_limit"].unique() == [-9.0]
+    period = reference.period_s
+    loop = design_loop(delay_free_design, reference, None)
+    error = simulate(loop, (-9.0, 12.0), np.linspace(0.0, 2 * period, 4001)).outputs["error"]
+    assert rows["peak_none"][1] == pytest.approx(np.abs(error[2000:]).max(), rel=1e-4)
+
+
 def test_usual_limits(delay_free_design: Design, monkeypatch: pytest.MonkeyPatch) -> None:
     """The printed one, for which the summary is, and multiples of the required one; nothing is solved here."""
-    monkeypatch.setattr(least_peak_error, "periodic_limit", lambda *_: Interval(9.0, 9.0))
-    monkeypatch.setattr(least_peak_error, "RUN_PERIODS", 1)
+    monkeypatch.setattr(module, "periodic_limit", lambda *_: Interval(9.0, 9.0))
+    monkeypatch.setattr(module, "RUN_PERIODS", 1)
     monkeypatch.setattr(RestLimit, "at", lambda *_: Interval(1.0, 2.0))
     monkeypatch.setattr(RestLimit, "_known", lambda *_: Interval(1.0, 2.0))
     monkeypatch.setattr(least_peak_error, "HORIZON", 1)
@@ -316,16 +350,16 @@ def test_command_line(extended_design: Design, tmp_path: Path, monkeypatch: pyte
         asked.append((design.kind, reference, limits))
         return {"limits_extended": pd.DataFrame({"limit": [2.0]}), "limits_extended_summary": pd.DataFrame({"a": [1]})}
 
-    monkeypatch.setattr("experiments.physical_limits.least_peak_error.limits_tables", found)
+    monkeypatch.setattr("experiments.physical_limits.limits_tables.limits_tables", found)
     path = tmp_path / "design.json"
     path.write_text(extended_design.to_json(), encoding="utf-8")
-    own = ["limits", "--limit", "9", "--limit", "12.5", "--amplitude", "7", "--offset", "2"]
+    own = ["limits", "--limit", "9", "--limit", "-3", "12.5", "--amplitude", "7", "--offset", "2"]
     for given in (["thesis", "limits"], own):
         result = CliRunner().invoke(main, [*given, str(path), "--output", str(tmp_path)])
         assert (result.exit_code, result.output) == (0, "")
     assert asked == [
         ("extended", thesis_reference("extended", (1.5,)), several_limits(extended_design)),
-        ("extended", Reference((7.0,), (1.5,), (0.0,), 2.0), (9.0, 12.5)),
+        ("extended", Reference((7.0,), (1.5,), (0.0,), 2.0), ((9.0,), (-3.0, 12.5))),
     ]
     assert sorted(file.name for file in tmp_path.glob("*.csv")) == [
         "limits_extended.csv",
@@ -341,5 +375,7 @@ def test_command_line_refuses_limits(extended_design: Design, tmp_path: Path, li
         main, ["limits", str(path), "--limit", "9", "--limit", limit, "--amplitude", "50", "--output", str(tmp_path)]
     )
     assert result.exit_code == 2
-    assert result.stderr == f"Error: the limit is {limit}; expected a positive finite number\n"
+    positive = f"Error: the saturation limit is {limit}; expected a positive number, or a lower and an upper one\n"
+    finite = "Error: the saturation limits are -inf and inf; expected finite ones\n"
+    assert result.stderr == (finite if limit == "inf" else positive)
     assert not list(tmp_path.glob("*.csv"))

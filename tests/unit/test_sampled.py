@@ -419,9 +419,6 @@ def test_runs_that_cannot_be_are_refused(other_design: Design) -> None:
             simulate_sampled(other_design, REFERENCE, None, drive, until_s)
     with pytest.raises(InputError, match=r"the run needs 2e\+1\d steps"):
         simulate_sampled(other_design, REFERENCE, None, Drive(2e9, "exact", (-1.0, 1.0)), 10.0)
-    proper = PlantModel(1.0, (Mode(20.0, 0.03),), (Mode(32.0, 0.02),), 0.06, 0)
-    with pytest.raises(InputError, match="as many zeros as poles"):
-        simulate_sampled(other_design, REFERENCE, None, drive, 1.0, proper)
 
 
 def test_a_dead_time_longer_than_the_run(other_design: Design) -> None:

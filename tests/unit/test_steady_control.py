@@ -8,10 +8,16 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from design.chapters_3_4.design_extended import design_extended
+from experiments.engine.simulate import simulate
 from experiments.physical_limits.intervals import Interval
 from experiments.physical_limits.least_peak_error import periodic_limit
+from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference, sinusoid
+from experiments.runs.sector_promise import steady_control
 from experiments.runs.steady_control import Wave, peak
+from identification.model.additive_bound import AdditiveBound
+from identification.model.model_file import IdentifiedModel
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 
@@ -87,6 +93,33 @@ def test_constants_and_slopes() -> None:
     assert Reference((0.0,), (0.0,), (0.0,), 4.0).required(PLANT).value == 0.0
 
 
+def test_zeros_at_zero_and_in_the_right_half_plane() -> None:
+    """A constant takes an integral of it, a sinusoid its amplitude over |P|, on whichever side the zeros lie."""
+    velocity = PlantModel(2.0, (), (Mode(5.0, 0.2),), 0.4, -1)
+    for level, slope in ((1e-9, 0.0), (0.0, 1e-9)):
+        assert Reference((3.0,), (1.0,), (0.4,), level, slope).required(velocity) == (math.inf, math.inf)
+    assert sinusoid(3.0, 1.0, 0.4, 0.0).required(velocity).value == pytest.approx(3.0 / abs(complex(velocity(1j))))
+    one, other = (
+        PlantModel(2.0, (Mode(3.0, zeta),), (), 0.1, 2, (rate,), (8.0,)) for zeta, rate in ((2.0, 4.0), (-2.0, -4.0))
+    )
+    reference = Reference((3.0, 1.0), (1.0, 3.0), (0.4, 0.0), 5.0, 7.0)  # a double integrator keeps its speed
+    time_s = np.linspace(0, 2 * math.pi, 100_001)
+    for plant in (one, other):
+        seen = np.abs(steady(reference, plant, time_s)).max()
+        found = reference.required(plant)
+        assert seen * (1 - 1e-9) <= found.value <= found.at_most <= seen * (1 + 1e-6)
+
+
+def test_distance_from_a_middle_and_constants_that_cancel() -> None:
+    """From the middle of unequal limits; of constants that cancel the bound keeps what their rounding may be."""
+    plant = PlantModel(2.0, (), (), 0.0, 0, (), (5.0,))
+    wave = 3.0 / abs(complex(plant(1j)))
+    assert sinusoid(3.0, 1.0, 0.0, 4.0).required(plant, 1.5).value == pytest.approx(wave + 0.5)
+    assert sinusoid(3.0, 1.0, 0.0, 4.0).required(plant, 3.0).value == pytest.approx(wave + 1.0)
+    found = Reference((1e12, 1.0), (0.0, 1.0), (math.pi / 6, 0.0), -5e11).required(plant)
+    assert found.at_most - found.value > 1e-5
+
+
 def test_no_error_is_forced_from_the_true_peak_on() -> None:
     """The peak is 7 % and more below the sum of the amplitudes; what a linear program would leave open there is 0."""
     reference = Reference((50.0, 20.0), (1.5, 4.5), (math.pi / 2, math.pi / 2), 0.0)
@@ -96,3 +129,27 @@ def test_no_error_is_forced_from_the_true_peak_on() -> None:
     assert periodic_limit(PLANT, reference, found.at_most) == Interval(0.0, 0.0)
     below = periodic_limit(PLANT, reference, 0.93 * found.value)
     assert 0 < below.lower < below.upper
+
+
+@pytest.mark.parametrize(
+    ("plant", "level"),
+    [
+        (PlantModel(5.0, (), (), 0.02, 0, (), (3.0,)), 1.5),
+        (PlantModel(5.0, (), (), 0.02, 1, (-20.0,), (10.0, 30.0)), 1.5),
+        (PlantModel(5.0, (), (Mode(60.0, 0.05),), 0.02, 2), 1.5),
+        (PlantModel(50.0, (), (Mode(10.0, 0.3),), 0.01, -1), 0.0),
+    ],
+)
+def test_the_control_of_a_loop_settles_at_it(plant: PlantModel, level: float) -> None:
+    """Around plants with 0, 1 and 2 integrators, a zero at s = 0 and one in the right half plane."""
+    bound = AdditiveBound(0.1 * abs(complex(plant(20j))), (), (), (), (100.0,))
+    omegas = (0.0, 4.0) if level else (4.0,)
+    design = design_extended(IdentifiedModel(plant, bound), omegas)
+    amplitudes, phases = ((0.5, 2.0), (math.pi / 2, 0.3)) if level else ((2.0,), (0.3,))
+    reference = Reference(amplitudes, omegas, phases, 2 * level / 3)
+    time_s = np.linspace(0.0, 30.0, 1501)
+    run = simulate(design_loop(design, reference, None), (-np.inf, np.inf), time_s)
+    late = time_s > 25
+    settled = steady_control(reference, plant, time_s)[late]
+    np.testing.assert_allclose(run.control[late], settled, atol=1e-8 * np.abs(settled).max())
+    assert np.abs(settled).max() == pytest.approx(reference.required(plant).value, rel=1e-3)

@@ -73,7 +73,7 @@ def test_the_windup_is_bounded_from_any_state(name: str) -> None:
 
 
 def test_the_windup_of_a_washout_in_closed_form() -> None:
-    """With u~ = x - delta and x' = -b delta it is (x0 - delta)^2/(2 b delta); V = x^2/b bounds it by x0^2/(2 b delta)."""
+    """With u~ = x - delta, x' = -b delta it is (x0 - delta)^2/(2 b delta); V = x^2/b bounds it by x0^2/(2 b delta)."""
     storage, start, delta = proved_storage(KINDS["washout"], certificate(KINDS["washout"])), np.array([4.0, 7.0]), 0.3
     totals, stored = plainly(storage, start[:, None], lambda _: np.array([1.3, 1.3]))
     np.testing.assert_allclose(totals[-1], (start - delta) ** 2 / (6 * delta), rtol=1e-4)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from design.anti_windup.compensator import second_order
-from design.anti_windup.condition import Sector
+from design.anti_windup.condition import PositiveReal, Sector
 from design.anti_windup.corrected_compensator import SETTLED, corrected
 from design.anti_windup.judge import judge
 from design.anti_windup.thesis_compensator import least_f
@@ -16,7 +16,7 @@ from design.blocks.block import plant_block
 from design.design_file import Design
 from identification.base.errors import InputError
 
-SECTORS = (0.9, 0.95, 0.99, 0.999)
+SECTORS = (0.9, 0.95, 0.99, 1.0)  # 1: positive real
 RECOVERIES = 9  # recovery times, from the fastest that the bandwidth leaves room for
 
 
@@ -44,7 +44,8 @@ def trade_off_tables(design: Design, tick: Callable[[], object] = lambda: None) 
     for recovery_s in np.geomspace(3 * np.log(1 / SETTLED) / bandwidth, 5 * own, RECOVERIES):
         for sector in SECTORS:
             try:
-                f = corrected(unstable, bound, float(recovery_s), Sector(sector), bandwidth).f
+                condition = Sector(sector) if sector < 1 else PositiveReal()
+                f = corrected(unstable, bound, float(recovery_s), condition, bandwidth).f
             except InputError:  # nothing meets the sector
                 f = np.nan
             rows.append((sector, recovery_s, f, bandwidth))

@@ -1,0 +1,103 @@
+"""What the runs of a design leave to gain: the least peak error beside what its loops reach."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from design.design_file import Design
+from experiments.physical_limits.intervals import Interval
+from experiments.physical_limits.least_peak_error import RestLimit, Tick, finite_limits, harmonic, periodic_limit
+from experiments.runs.compare_anti_windups import SETTLED, loops, run_all
+from experiments.runs.metrics import settling_time
+from experiments.runs.references import Reference
+from identification.model.plant import PlantModel
+
+FEWER_STEPS = 100  # of a period from rest, for the settling time alone
+RUN_PERIODS = 12
+SAMPLES_PER_PERIOD = 2000
+
+NEVER = Interval(math.nan, math.nan)
+
+
+def limits_tables(
+    design: Design, reference: Reference, limits: Sequence[float | Sequence[float]], tick: Tick = lambda: None
+) -> dict[str, pd.DataFrame]:
+    """What the runs without and with anti-windup leave to gain, under several limits.
+
+    Parameters
+    ----------
+    design
+        Of either kind.
+    reference
+        Periodic, see :func:`experiments.physical_limits.least_peak_error.periodic_limit`.
+    limits
+        Of the actuator, each (lower, upper), or one number for +- that.
+    tick
+        Called after every program and after every set of runs.
+
+    Returns
+    -------
+    dict
+        ``limits_KIND``, a row for each limit, from the nearest pair to the farthest: lower_limit, limit (the upper
+        one), required (the most that the control of perfect tracking reaches), periodic_lower, periodic_upper;
+        settling_lower_s, settling_upper_s (from rest, to within 1 % of the reference's amplitude, see
+        :meth:`experiments.physical_limits.least_peak_error.RestLimit.settling`); and for every run NAME peak_NAME
+        (greatest |error| over the last of twelve periods), settling_NAME_s (to the same band), ratio_NAME (peak_NAME
+        over periodic_lower). Cells are empty for what never settles, diverges, or would be divided by zero.
+        ``limits_KIND_summary`` for the first limit: lower_limit, limit, start_s, rest_lower, rest_upper (see
+        :class:`experiments.physical_limits.least_peak_error.RestLimit`) and tail_NAME, the greatest |error| of the run
+        from start_s to the horizon of three periods.
+
+    Raises
+    ------
+    InputError
+        See :func:`experiments.physical_limits.least_peak_error.periodic_limit`.
+    """
+    plant, name = design.loop_plant, design.kind.replace("-", "_")
+    required = reference.required(plant).value
+    harmonic(plant, reference)
+    pairs = [finite_limits(plant, limit) for limit in limits]
+    rest = RestLimit(plant, reference, pairs[0], tick=tick)
+    summary = rest.table().assign(**_named(pairs[0]))
+    evenly = np.linspace(0.0, RUN_PERIODS * reference.period_s, RUN_PERIODS * SAMPLES_PER_PERIOD + 1)
+    time_s, every, rows = np.union1d(evenly, summary["start_s"]), loops(design, reference), []
+    for pair in sorted(set(pairs), key=lambda pair: (pair[1] - pair[0], pair)):
+        runs = run_all(every, pair, time_s)
+        tick()
+        errors = {run: np.abs(result.outputs["error"]) for run, result in runs.items()}
+        rows.append(_named(pair) | {"required": required} | _row(plant, reference, pair, time_s, errors, tick))
+        if pair == pairs[0]:
+            counted = time_s <= rest.horizon_s
+            for run, error in errors.items():
+                tails = np.maximum.accumulate(error[counted][::-1])[::-1]
+                summary[f"tail_{run}"] = tails[np.searchsorted(time_s, summary["start_s"])]
+    return {f"limits_{name}": pd.DataFrame(rows), f"limits_{name}_summary": summary}
+
+
+def _named(limits: tuple[float, float]) -> dict[str, float]:
+    return {"lower_limit": limits[0], "limit": limits[1]}
+
+
+def _row(
+    plant: PlantModel,
+    reference: Reference,
+    limits: tuple[float, float],
+    time_s: np.ndarray,
+    errors: Mapping[str, np.ndarray],
+    tick: Tick,
+) -> dict[str, float]:
+    band, periodic, settled = SETTLED * reference.amplitude, periodic_limit(plant, reference, limits), NEVER
+    tick()
+    if periodic.lower <= band:
+        settled = RestLimit(plant, reference, limits, FEWER_STEPS, tick).settling(band)
+    row = {"periodic_lower": periodic.lower, "periodic_upper": periodic.upper}
+    row |= {"settling_lower_s": settled.lower, "settling_upper_s": settled.upper}
+    for run, error in errors.items():
+        row[f"peak_{run}"] = peak = float(error[time_s >= time_s[-1] - reference.period_s].max())
+        row[f"settling_{run}_s"] = settling_time(time_s, error, band) if peak <= band else math.nan
+        row[f"ratio_{run}"] = peak / periodic.lower if periodic.lower > 0 else math.nan
+    return row
