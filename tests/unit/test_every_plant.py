@@ -187,7 +187,7 @@ def test_reasons_and_inner_factor_survive_the_file(design: Design, tmp_path) -> 
 @pytest.mark.parametrize("delay_s", [0.02, 0.0])
 @pytest.mark.parametrize("kind", ["none", "corrected"])
 def test_a_plant_that_jumps_with_its_input_runs_like_its_sampled_loop(delay_s: float, kind: str) -> None:
-    """As many zeros as poles: y and y_d have a direct part. The computer's difference equations share no code with it."""
+    """With as many zeros as poles y and y_d have a direct part; the computer shares no code with the engine."""
     plant = PlantModel(5.0, (), (), delay_s, 0, (40.0,), (3.0,))
     design = design_extended(IdentifiedModel(plant, bound_of(plant, 2.0)), [2.0])
     reference = sinusoid(1.0, 2.0)
