@@ -27,12 +27,16 @@ FIGURES = {
     "limits_extended": "A.4",
     "sampled": "A.5",
     "campaign": "A.6",
+    "hidden_modes": "A.9",
 }
 """What is drawn of each experiment that needs a design."""
 
 FOLLOWING = {
     "delay_free": ("delay_free", "limits_delay_free"),
-    "extended": ("f_gamma", "extended", "trade_off", "interpolation", "limits_extended", "sampled", "campaign"),
+    "extended": (
+        *("f_gamma", "extended", "trade_off", "interpolation", "limits_extended", "sampled", "campaign"),
+        "hidden_modes",
+    ),
     "robust": ("robustness",),
 }
 """The experiments that need each design."""

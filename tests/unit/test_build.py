@@ -31,6 +31,7 @@ EXTENDED = {
         for part in ("", "_summary")
     ),
     *("results/campaign.csv", "results/campaign_summary.csv", "results/compare.csv", "results/compare_runs.csv"),
+    *("results/hidden_modes.csv", "results/hidden_modes_summary.csv"),
     *(
         f"figures/fig_{n}.{kind}"
         for n in (
@@ -47,6 +48,7 @@ EXTENDED = {
             "a_05",
             "a_06",
             "a_08",
+            "a_09",
         )
         for kind in ("pdf", "svg", "png", "txt")
     ),

@@ -72,6 +72,6 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
         axes["b"].loglog(time_s, line.abs(), **LINES["reference"], label="half a step")
         axes["b"].legend(**panels.ABOVE)
     axes["a"].set(xlabel="Time $t$ [s]", ylabel="Drift of the output $y$", xlim=(0, time_s.iloc[-1]))
-    axes["b"].set(xlabel="Time $t$ [s]", ylabel="Its size", xlim=(time_s.iloc[0], time_s.iloc[-1]))
+    axes["b"].set(xlabel="Time $t$ [s]", ylabel="Size of the drift", xlim=(time_s.iloc[0], time_s.iloc[-1]))
     axes["a"].legend(**panels.ABOVE, ncols=2)
     return axes["a"].figure  # type: ignore[return-value]
