@@ -182,6 +182,12 @@ def _experiments(asked: Asked) -> list[Step]:
         _tables(folder, "limits", delay_free, stem="limits_delay_free"),
         _tables(folder, "limits", extended, stem="limits_extended"),
         _tables(folder, "sampled-rates", extended, options=limit, stem="sampled"),
+        Step(
+            "compare",
+            ("experiments", "thesis", "compare", *limit, "--output", str(folder / "results"), "--", str(extended)),
+            _csv(folder, "compare", "compare_runs"),
+            (extended,),
+        ),
         _tables(folder, "hidden-modes", extended, options=limit),
         Step("campaign", ("experiments", "thesis", "campaign", *plants, "--", str(extended)), (campaign,), (extended,)),
         Step(

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from design.anti_windup.compensator import AntiWindup
 from design.anti_windup.judge import Compensator, CorrectedCompensator, PrintedCompensator
+from design.anti_windup.linear_loop import LinearLoop
 from design.blocks.block import Block, plant_denominator
 from design.blocks.inner_outer import inner_outer
 from design.hinf.mixed_sensitivity import Synthesis
@@ -21,7 +22,7 @@ from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
 from identification.model.plant_json import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
 
-SCHEMA = 2
+SCHEMA = 3
 KINDS = ("delay-free", "extended")
 
 Named = TypeVar("Named")
@@ -106,10 +107,26 @@ class Design:
         return _named(self.anti_windup, name).kind
 
     def chosen(self, asked: Asked) -> AntiWindup | None:
-        """theta1~ as a caller may ask for it: by name, or as it is; ``none`` and None are no anti-windup."""
+        """theta1~ as a caller may ask for it; ``none`` and None are no anti-windup.
+
+        A name is one that the design holds, or of :data:`design.anti_windup.other_anti_windups.OTHERS`, which are made
+        as they are asked for. Raises InputError where there is no such anti-windup.
+        """
         if isinstance(asked, str):
+            if asked not in self.anti_windup and asked != "none":
+                from design.anti_windup.other_anti_windups import OTHERS  # only here: nothing else needs them
+
+                if asked in OTHERS:
+                    return OTHERS[asked](self.linear_loop)
             return None if asked == "none" else self.compensator(asked)
         return asked.kind if isinstance(asked, Compensator) else asked
+
+    @property
+    def linear_loop(self) -> LinearLoop:
+        """What the anti-windups of others are made of."""
+        pole = self.parameters.a if isinstance(self.parameters, ExtendedParameters) else None
+        recovery_s, bandwidth = self.corrected.judgement.recovery_s, self.corrected.bandwidth
+        return LinearLoop(self.loop_plant, *self.controller_parts(), pole, self.reference_omegas, recovery_s, bandwidth)
 
     def controller_parts(self) -> tuple[Block, Block]:
         """The blocks of C = forward/(1 - feedback exp(-h s)) with h the plant's dead time, (3.10) and (3.31).

@@ -16,7 +16,7 @@ from typing import Any
 import click
 
 from experiments.campaign.command import campaign_command
-from experiments.options import DESIGN, OUTPUT_FOLDER, sinusoid_options
+from experiments.options import DESIGN, OUTPUT_FOLDER, positive_limit, sinusoid_options
 from experiments.pair_options import NumberPair, PairCommand
 from experiments.run_commands import sampled_command, simulate_command
 from experiments.tables import write_into
@@ -82,6 +82,25 @@ def limits(design: Path, limits: tuple[tuple[float, ...], ...], output: Path, **
     content = read_design(design)
     with tqdm(desc="limits", unit="", disable=None, leave=False) as bar:
         write_into(output, limits_tables(content, sinusoids(content, **reference), limits, bar.update))
+
+
+@main.command("compare")
+@DESIGN
+@click.option("--limit", type=float, help="Saturation limits +-LIMIT; 1.2 times what the reference needs by default.")
+@sinusoid_options
+@OUTPUT_FOLDER
+def compare(design: Path, limit: float | None, output: Path, **reference: Any) -> None:
+    """The anti-windups of DESIGN beside those of others: compare.csv, compare_runs.csv."""
+    from tqdm import tqdm
+
+    from design.design_file import read_design
+    from experiments.asked_reference import sinusoids
+    from experiments.comparison import comparison_tables
+
+    content = read_design(design)
+    with tqdm(desc="compare", unit="", disable=None, leave=False) as bar:
+        asked = sinusoids(content, **reference)
+        write_into(output, comparison_tables(content, asked, positive_limit(limit), bar.update))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,11 @@ SHARE = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"  # of a run, i
 _run_options = together(
     DESIGN,
     LIMIT_PAIR,
-    click.option("--anti-windup", required=True, help="none, thesis, corrected, or another of DESIGN."),
+    click.option(
+        "--anti-windup",
+        required=True,
+        help="none, thesis, corrected, another of DESIGN, or one of others: see the README.",
+    ),
     click.option("--until", type=float, required=True, help="Length of the run in seconds."),
     reference_options,
     disturbance_options,

@@ -15,6 +15,7 @@ from identification.base.errors import InputError, MissingFile, shown
 from identification.base.files import is_there, read_text
 
 TEXTS = ["run", "method", "case", "set", "delay", "weights", "search", "outcome", "reading"]
+TEXTS += ["upset", "refused", "guarantee"]
 """Columns of words; all others hold numbers."""
 
 

@@ -80,16 +80,20 @@ def anti_windup(theta1_tilde: Block) -> AntiWindup:
     plant's integrator.
     """
     _require_strictly_proper_and_stable(theta1_tilde)
-    q = geometric_scale(Block(1.0, theta1_tilde.poles))
-    denominator = polynomial(Block(1.0, theta1_tilde.poles), q)
-    numerator = polynomial(Block(theta1_tilde.gain, theta1_tilde.zeros), q)
+    return AntiWindup(theta1_tilde, plus_one(theta1_tilde))
+
+
+def plus_one(block: Block) -> Block:
+    """1 + a strictly proper block without dead time; a zero that only rounding moves from s = 0 is put there."""
+    q = geometric_scale(Block(1.0, block.poles))
+    denominator = polynomial(Block(1.0, block.poles), q)
+    numerator = polynomial(Block(block.gain, block.zeros), q)
     total = np.polyadd(denominator, numerator)
     size = np.polyadd(np.abs(denominator), np.abs(numerator))
     at_zero = 0
     while abs(total[-1]) <= AT_ZERO * size[len(total) - 1]:
         total, at_zero = total[:-1], at_zero + 1
-    zeros = from_polynomial(total, q).zeros + (0j,) * at_zero
-    return AntiWindup(theta1_tilde, Block(1.0, zeros, theta1_tilde.poles))
+    return Block(1.0, from_polynomial(total, q).zeros + (0j,) * at_zero, block.poles)
 
 
 def from_one_plus(one_plus: Block) -> AntiWindup:

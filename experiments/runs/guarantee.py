@@ -62,7 +62,7 @@ def guarantee(design: Design, anti_windup: Asked, plant: PlantModel | None = Non
     if plant is None or plant == design.loop_plant:
         certificate = design.corrected.certificate if kind == design.corrected.kind else None
         storage = None if certificate is None else proved_storage(kind.one_plus, certificate)
-        return _without_theta2(design, kind) or Guarantee(circle_sector(kind.theta1_tilde), storage=storage)
+        return _without_criterion(design, kind) or Guarantee(circle_sector(kind.theta1_tilde), storage=storage)
     if not _is_within(design, plant):
         return Guarantee(0.0, "the true plant is not within W_a of the design's model")
     return guarantee_within(design, kind)
@@ -70,7 +70,7 @@ def guarantee(design: Design, anti_windup: Asked, plant: PlantModel | None = Non
 
 def guarantee_within(design: Design, anti_windup: AntiWindup) -> Guarantee:
     """What a design promises of runs with every plant within W_a, see :func:`design.anti_windup.popov.robust_loss`."""
-    if missing := _without_theta2(design, anti_windup):
+    if missing := _without_criterion(design, anti_windup):
         return missing
     from design.anti_windup.popov import robust_loss  # only here: it takes a third of a second to import
 
@@ -90,7 +90,9 @@ def guarantee_within(design: Design, anti_windup: AntiWindup) -> Guarantee:
     return Guarantee(circle_sector(anti_windup.theta1_tilde, loss, roots), any_plant=True)
 
 
-def _without_theta2(design: Design, anti_windup: AntiWindup) -> Guarantee | None:
+def _without_criterion(design: Design, anti_windup: AntiWindup) -> Guarantee | None:
+    if not anti_windup.theta1_tilde.is_stable:
+        return Guarantee(0.0, "theta1~ is not stable by itself, and no criterion of ours judges it in the loop")
     if anti_windup.theta2(design.loop_plant).is_stable:
         return None
     sector = sector_text(circle_sector(anti_windup.theta1_tilde))

@@ -156,6 +156,24 @@ def sampled_rates(design: Path, limit: float | None, output: Path) -> None:
     write_into(output, sampled_rates_tables(read_design(design, "extended"), positive_limit(limit)))
 
 
+@thesis.command("compare")
+@DESIGN
+@LIMIT
+@OUTPUT_FOLDER
+def compare(design: Path, limit: float | None, output: Path) -> None:
+    """The anti-windups of DESIGN beside those of others: compare.csv, compare_runs.csv."""
+    from tqdm import tqdm
+
+    from design.design_file import read_design
+    from experiments.comparison import comparison_tables
+    from experiments.thesis.printed_choices import thesis_reference
+
+    content = read_design(design)
+    reference = thesis_reference(content.kind, content.reference_omegas)
+    with tqdm(desc="compare", unit="", disable=None, leave=False) as bar:
+        write_into(output, comparison_tables(content, reference, positive_limit(limit), bar.update))
+
+
 @thesis.command("hidden-modes")
 @DESIGN
 @LIMIT

@@ -1,0 +1,163 @@
+"""The anti-windups of a design beside each other, those of others too: two upsets of one run, a row for each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+
+from design.anti_windup.compensator import AntiWindup, uncertainty_cost
+from design.anti_windup.other_anti_windups import OTHERS
+from design.design_file import Design
+from experiments.engine.simulate import Run, simulate
+from experiments.physical_limits.least_peak_error import RestLimit
+from experiments.runs.compare_anti_windups import SETTLED, run_all, span
+from experiments.runs.design_loop import design_loop
+from experiments.runs.disturbances import Disturbances, steps
+from experiments.runs.guarantee import guarantee, sector_text
+from experiments.runs.metrics import settling_time
+from experiments.runs.references import Reference
+from identification.base.errors import InputError
+
+MULTIPLE = 1.2  # of the control that the reference needs: the limit unless given
+PERIODS = 4  # for each upset
+PULSE = 0.1  # of a period: how long the disturbance acts
+SAMPLES = 2000  # a period
+KEPT = 8  # of the samples every so many are written
+STEPS = 100  # of a period, of the physical limit
+
+Tick = Callable[[], object]
+
+
+def comparison_tables(
+    design: Design, reference: Reference, limit: float | None = None, tick: Tick = lambda: None
+) -> dict[str, pd.DataFrame]:
+    """Run a design without and with each anti-windup that there is for it, from rest and through a disturbance.
+
+    Parameters
+    ----------
+    design
+        Of either kind.
+    reference
+        r(t).
+    limit
+        Of the actuator, +-limit; unless given, 1.2 times the most that the control of perfect tracking reaches.
+    tick
+        Called after every run.
+
+    Returns
+    -------
+    dict
+        ``compare``: for every anti-windup two rows. The upset ``start`` begins at rest, ``pulse`` four periods later:
+        a disturbance as large as the limit is added to the plant's input for a tenth of a period. Each counts for four
+        periods, and times count from its beginning.
+
+        run, upset, refused
+            The last is the sentence where the design has no such anti-windup; the cells after it are empty then.
+        guarantee, f
+            ``global``: whatever the control; ``sector K``; ``none``. ||W_a (1 + theta1~)||, (2.19); empty where
+            the anti-windup is not of this form.
+        recovery_s
+            When |y - y0| has fallen to 1 % of the reference's amplitude for good, y0 being the output without
+            saturation and under the same disturbance; empty: not within the four periods.
+        last_saturation_s, crossings
+            Of the limits; the first is empty where u is saturated at the end.
+        peak_error, from_s, least_peak_error
+            The greatest |r - y| from from_s on, a quarter of a period after the beginning, and what no controller
+            betters; the last for the start only, and for a periodic reference.
+        largest_control, last_error
+            The greatest |u| over the limit, and the greatest |r - y| of the last period.
+        limit, required
+            The latter is the most that the control of perfect tracking reaches.
+
+        ``compare_runs``: time_s, reference, output_unsaturated, and for every run NAME output_NAME and control_NAME.
+
+    Raises
+    ------
+    InputError
+        The limit is not positive, or perfect tracking needs no control or one without bound.
+    """
+    plant = design.loop_plant
+    required = reference.required(plant).value
+    limit = MULTIPLE * required if limit is None else limit
+    if not 0 < limit < np.inf:
+        raise InputError(f"the limit is {limit:g}; expected a positive finite number")
+    period = span(design, reference)
+    time_s = np.linspace(0.0, 2 * PERIODS * period, 2 * PERIODS * SAMPLES + 1)
+    begin = PERIODS * period
+    disturbances = Disturbances(input=steps([(limit, begin), (0.0, begin + PULSE * period)]))
+
+    kinds, refused = anti_windups(design)
+    loops = {name: design_loop(design, reference, kind, None, disturbances) for name, kind in kinds.items()}
+    unsaturated = simulate(loops["none"], (-np.inf, np.inf), time_s).outputs["output"]
+    runs: dict[str, Run] = {}
+    for name, loop in loops.items():
+        runs |= run_all({name: loop}, limit, time_s)
+        tick()
+    from_s, least = _least_error(design, reference, limit, period)
+    rows = []
+    for name in ("none", *design.anti_windup, *OTHERS):
+        known: dict[str, object] = {"limit": limit, "required": required, "refused": refused.get(name)}
+        if name in kinds:
+            known |= _promised(design, kinds[name])
+        for upset, start_s in (("start", 0.0), ("pulse", begin)):
+            row: dict[str, object] = {"run": name, "upset": upset} | known
+            if name in runs:
+                row |= _row(runs[name], unsaturated, start_s, period, from_s, limit, SETTLED * reference.amplitude)
+                row |= {"least_peak_error": least if upset == "start" else np.nan}
+            rows.append(row)
+    series = {"time_s": time_s, "reference": reference(time_s), "output_unsaturated": unsaturated}
+    for name, run in runs.items():
+        series |= {f"output_{name}": run.outputs["output"], f"control_{name}": run.control}
+    return {"compare": pd.DataFrame(rows), "compare_runs": pd.DataFrame(series).iloc[::KEPT]}
+
+
+def anti_windups(design: Design) -> tuple[dict[str, AntiWindup | None], dict[str, str]]:
+    """No anti-windup, those that a design holds and those of others, by name; and why some of these do not exist."""
+    found: dict[str, AntiWindup | None] = {"none": None}
+    refused = {}
+    for name in (*design.anti_windup, *OTHERS):
+        try:
+            found[name] = design.chosen(name)
+        except InputError as error:
+            refused[name] = str(error)
+    return found, refused
+
+
+def _promised(design: Design, kind: AntiWindup | None) -> dict[str, object]:
+    sector = guarantee(design, kind).sector
+    said = "none" if sector == 0 else "global" if sector >= 1 else f"sector {sector_text(sector)}"
+    if kind is None or not kind.theta1_tilde.is_stable:
+        return {"guarantee": said, "f": np.nan}
+    return {"guarantee": said, "f": uncertainty_cost(design.additive_bound, kind.one_plus)[0]}
+
+
+def _least_error(design: Design, reference: Reference, limit: float, period: float) -> tuple[float, float]:
+    """From when on errors count, in seconds, and how small the greatest can be at best; NaN where it is not known."""
+    try:
+        rest = RestLimit(design.loop_plant, reference, limit, STEPS)
+        index = round(rest.last / (4 * 2))
+        return rest.start_s(index), rest.at(index).lower
+    except InputError:
+        return period / 4, np.nan
+
+
+def _row(
+    run: Run, unsaturated: np.ndarray, start_s: float, period: float, from_s: float, limit: float, band: float
+) -> dict[str, object]:
+    end_s = start_s + PERIODS * period
+    counts = (run.time_s >= start_s) & (run.time_s <= end_s)
+    time_s, control = run.time_s[counts] - start_s, run.control[counts]
+    output, error = run.outputs["output"][counts], np.abs(run.outputs["error"][counts])
+    events = run.events_s[(run.events_s >= start_s) & (run.events_s <= end_s)] - start_s
+    saturated = control != run.saturated_control[counts]
+    return {
+        "recovery_s": settling_time(time_s, output - unsaturated[counts], band),
+        "last_saturation_s": np.nan if saturated[-1] else max(events, default=0.0),
+        "peak_error": error[time_s >= from_s].max(),
+        "from_s": from_s,
+        "largest_control": np.abs(control).max() / limit,
+        "last_error": error[time_s >= time_s[-1] - period].max(),
+        "crossings": len(events),
+    }

@@ -1,0 +1,89 @@
+"""The anti-windups beside each other: what the table says is what the runs do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from design.anti_windup.other_anti_windups import OTHERS
+from design.chapters_3_4.design_extended import design_extended
+from design.design_file import Design
+from experiments.__main__ import main
+from experiments.comparison import comparison_tables
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
+from experiments.runs.disturbances import Disturbances, steps
+from experiments.runs.references import sinusoid
+from identification.model.additive_bound import AdditiveBound
+from identification.model.model_file import IdentifiedModel
+from identification.model.plant import PlantModel
+
+BOUND = AdditiveBound.printed_form(gain=0.01, corner=100.0, omega=300.0, zeta=0.1)
+REFERENCE = sinusoid(10.0, 1.5, 1.2)
+PERIOD = 2 * np.pi / 1.5
+
+
+@pytest.fixture(scope="module")
+def late_integrator() -> Design:
+    return design_extended(IdentifiedModel(PlantModel(2.0, (), (), 0.05), BOUND), [1.5], 4.0, [(2.0, 1.0)])
+
+
+@pytest.fixture(scope="module")
+def table(late_integrator: Design) -> pd.DataFrame:
+    """Under 0.9 times the control that tracking needs."""
+    return comparison_tables(late_integrator, REFERENCE, 0.9 * 7.5)["compare"]
+
+
+def test_every_anti_windup_has_its_rows(table: pd.DataFrame) -> None:
+    assert list(table["run"][::2]) == ["none", "thesis", "corrected", *OTHERS]
+    assert list(table["upset"]) == ["start", "pulse"] * (len(table) // 2)
+    refused = table[table["refused"].notna()]
+    assert set(refused["run"]) == {"internal-model"}
+    assert refused[["recovery_s", "peak_error", "guarantee"]].isna().all(axis=None)
+    assert table["required"].iloc[0] == pytest.approx(7.5)
+    guarantees = dict(zip(table["run"], table["guarantee"], strict=True))
+    assert guarantees["observer"] == guarantees["corrected"] == "global"
+    assert guarantees["none"] == guarantees["back-calculation"] == "none"
+
+
+def test_no_run_is_below_the_physical_limit(table: pd.DataFrame) -> None:
+    start = table[(table["upset"] == "start") & table["refused"].isna()]
+    assert start["least_peak_error"].min() > 0.1
+    assert (start["peak_error"] >= start["least_peak_error"]).all()
+
+
+def test_the_numbers_are_those_of_a_run(late_integrator: Design) -> None:
+    """The loop without saturation is y_lin of the saturated one here; it comes from another run there."""
+    tables = comparison_tables(late_integrator, REFERENCE)
+    limit, begin = 1.2 * 7.5, 4 * PERIOD
+    pulse = Disturbances(input=steps([(limit, begin), (0.0, begin + PERIOD / 10)]))
+    time_s = np.linspace(0.0, 8 * PERIOD, 16001)
+    run = simulate(design_loop(late_integrator, REFERENCE, "observer", None, pulse), (-limit, limit), time_s)
+    away = np.abs(run.outputs["output"] - run.outputs["y_lin"]) > 0.1
+    rows = tables["compare"].query("run == 'observer'").set_index("upset")
+    for upset, start_s in (("start", 0.0), ("pulse", begin)):
+        counts = (time_s >= start_s - 1e-9) & (time_s <= start_s + 4 * PERIOD + 1e-9)
+        assert rows["limit"][upset] == pytest.approx(limit)
+        assert rows["recovery_s"][upset] == pytest.approx(time_s[counts & away][-1] - start_s, abs=5e-3)
+        assert rows["largest_control"][upset] == pytest.approx(np.abs(run.control[counts]).max() / limit, rel=1e-6)
+        events = run.events_s[(run.events_s >= start_s) & (run.events_s <= start_s + 4 * PERIOD)]
+        assert rows["crossings"][upset] == len(events) > 0
+        assert rows["last_saturation_s"][upset] == pytest.approx(events[-1] - start_s)
+        late = counts & (time_s >= start_s + rows["from_s"][upset] + 1e-9)
+        assert rows["peak_error"][upset] == pytest.approx(np.abs(run.outputs["error"][late]).max(), rel=1e-2)
+
+
+def test_the_command_writes_both_tables_or_none(late_integrator: Design, tmp_path: Path) -> None:
+    path, folder = tmp_path / "design.json", tmp_path / "out"
+    folder.mkdir()
+    path.write_text(late_integrator.to_json(), encoding="utf-8")
+    words = ["compare", str(path), "--amplitude", "10", "--output", str(folder)]
+    refused = CliRunner().invoke(main, [*words, "--limit", "-1"])
+    assert (refused.exit_code, list(folder.iterdir())) == (2, [])
+    assert "expected a positive number" in refused.output
+    assert CliRunner().invoke(main, words).exit_code == 0
+    assert {each.name for each in folder.iterdir()} == {"compare.csv", "compare_runs.csv"}
