@@ -34,6 +34,8 @@ class Series(NamedTuple):
     knots, pieces, early
         The plant's own times (j,) at which the last states take the values (j, g), the end of no step; and how many
         samples before the first command the disturbance begins to act.
+    ahead, into
+        Shapes (2, n, n), (2, n): what the state and a standing input make of the state over [0, read) and [read, T).
     """
 
     A: Array
@@ -46,6 +48,8 @@ class Series(NamedTuple):
     knots: Array
     pieces: Array
     early: int
+    ahead: Array
+    into: Array
 
 
 class Actuator(NamedTuple):
@@ -182,6 +186,7 @@ def run(
     A_T, b_T, C_T, d_T = feedback.A, feedback.b, feedback.C, feedback.d
     A_w, b_w, C_w, d_w = theta.A, theta.b, theta.C, theta.d
     b, c, late, read, early = plant.b, plant.c, plant.late, plant.read, plant.early
+    ahead, into, stands = plant.ahead, plant.into, actuator.slew == np.inf and len(plant.knots) == 0
     s = len(r)
     y, u, command, start = np.zeros(s), np.zeros(s), np.zeros(s), np.zeros(s)
     p_T, p_w = np.zeros((len(d_T), s)), np.zeros(s)  # of feedback, and theta2 u_tilde, before their memories
@@ -222,11 +227,17 @@ def run(
         p_w[k] += d_w[1] * u_tilde
         command[k], start[k] = _given_out(actuator, u[k]), place
 
-        knot = _move_disturbed(plant, x, term, following, place, command[k], slew, 0.0, read, k * T, knot)
+        if stands:
+            _step(ahead[0], into[0], x, following, command[k], most_x)
+        else:
+            knot = _move_disturbed(plant, x, term, following, place, command[k], slew, 0.0, read, k * T, knot)
         if k + late + 1 < s:
             moved = slew * read if slew < np.inf else np.inf
             y[k + late + 1] = _dot(c, x) + plant.through * (place + min(max(command[k] - place, -moved), moved))
-        knot = _move_disturbed(plant, x, term, following, place, command[k], slew, read, T, k * T, knot)
+        if stands:
+            _step(ahead[1], into[1], x, following, command[k], most_x)
+        else:
+            knot = _move_disturbed(plant, x, term, following, place, command[k], slew, read, T, k * T, knot)
         way = command[k] - place
         place = command[k] if abs(way) <= slew * T else place + np.sign(way) * slew * T
         small = _step(A_K, b_K, x_K, following, e, most_x)

@@ -102,8 +102,8 @@ def sample_block(system: StateSpace, delays_s: Sequence[float], sample_time_s: f
             length=np.where(rest > 0, 2, 1),
             taps=np.column_stack([1 - rest, rest]),
         )
-    A, b = _held(system, sample_time_s)
-    rows = [_held(system, (1 - share) * sample_time_s) if share else (np.eye(n), np.zeros(n)) for share in rest]
+    A, b = held(system, sample_time_s)
+    rows = [held(system, (1 - share) * sample_time_s) if share else (np.eye(n), np.zeros(n)) for share in rest]
     return SampledBlock(
         A=A,
         b=b,
@@ -115,8 +115,14 @@ def sample_block(system: StateSpace, delays_s: Sequence[float], sample_time_s: f
     )
 
 
-def _held(system: StateSpace, length_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """exp(A t) and the integral of exp(A t) b over 0 <= t <= length_s."""
+def held(system: StateSpace, length_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """What the state at one time and a standing input make of the state ``length_s`` seconds later.
+
+    Returns
+    -------
+    ahead (n, n), into (n,)
+        exp(A length_s), and the integral of exp(A t) b over 0 <= t <= length_s.
+    """
     n = len(system.b)
     whole = _exponential(np.block([[system.A, system.b[:, None]], [np.zeros((1, n + 1))]]) * length_s)
     return np.ascontiguousarray(whole[:n, :n]), whole[:n, n].copy()
@@ -158,10 +164,10 @@ def sample_memory(form: CoprimeForm, sample_time_s: float, method: str) -> Sampl
         table = np.zeros((2, whole + 2))
         table[0, 0], table[1] = 1.0, taps
         return sampled._replace(first=np.zeros(2, dtype=int), length=np.array([1, whole + 2]), taps=table)
-    states, into = _held(system, sample_time_s)
+    states, into = held(system, sample_time_s)
     n, q = len(system.b), len(b)
     integrals = _integrals(A, b, system, sample_time_s)
-    ahead, beside = _held(system, (1 - rest) * sample_time_s)
+    ahead, beside = held(system, (1 - rest) * sample_time_s)
     last = _integrals(A, b, system, rest * sample_time_s) @ np.block(
         [[ahead, beside[:, None]], [np.zeros((1, n)), 1.0]]
     )

@@ -10,11 +10,11 @@ import numpy as np
 
 from design.anti_windup.compensator import AntiWindup
 from design.blocks.block import Block, plant_block
-from design.blocks.state_space import block_diagonal, realize
+from design.blocks.state_space import StateSpace, block_diagonal, realize
 from design.chapters_3_4.realisation import realised
 from design.design_file import Asked, Design
 from experiments.drive.compiled_steps import Actuator, Series, run
-from experiments.drive.difference_equations import METHODS, SampledBlock, sample_block, sample_memory, split
+from experiments.drive.difference_equations import METHODS, SampledBlock, held, sample_block, sample_memory, split
 from experiments.engine.simulate import MOST_STEPS, DivergenceError, limit_pair
 from experiments.engine.watched import Tick, watched
 from experiments.runs.disturbances import UNDISTURBED, Disturbances, Signal
@@ -224,7 +224,10 @@ def _series(plant: PlantModel, drive: Drive, until_s: float, disturbance: Signal
     whole, rest = split(late_s, T)
     ahead_s = late_s - plant.delay_s  # of the plant's own time, in which commands are not late
     early = max(math.ceil(ahead_s / T - SPARE), 0) if len(knots) else 0
-    return Series(A, b, c, through, norm, whole, (1 - rest) * T, knots - ahead_s, pieces, early)
+    read = (1 - rest) * T
+    parts = [held(StateSpace(A, b, c[None], np.zeros(1)), length_s) for length_s in (read, T - read)]
+    ahead, into = (np.array(each) for each in zip(*parts, strict=True))
+    return Series(A, b, c, through, norm, whole, read, knots - ahead_s, pieces, early, ahead, into)
 
 
 def _controller(
