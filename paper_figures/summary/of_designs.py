@@ -26,13 +26,23 @@ FIGURES = {
     "limits_delay_free": "A.4",
     "limits_extended": "A.4",
     "sampled": "A.5",
+    "compare": "A.8",
     "campaign": "A.6",
 }
 """What is drawn of each experiment that needs a design."""
 
 FOLLOWING = {
     "delay_free": ("delay_free", "limits_delay_free"),
-    "extended": ("f_gamma", "extended", "trade_off", "interpolation", "limits_extended", "sampled", "campaign"),
+    "extended": (
+        "f_gamma",
+        "extended",
+        "trade_off",
+        "interpolation",
+        "limits_extended",
+        "sampled",
+        "compare",
+        "campaign",
+    ),
     "robust": ("robustness",),
 }
 """The experiments that need each design."""
