@@ -188,6 +188,7 @@ def _experiments(asked: Asked) -> list[Step]:
             _csv(folder, "compare", "compare_runs"),
             (extended,),
         ),
+        _tables(folder, "hidden-modes", extended, options=limit),
         Step("campaign", ("experiments", "thesis", "campaign", *plants, "--", str(extended)), (campaign,), (extended,)),
         Step(
             "campaign-tables",

@@ -271,6 +271,7 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
         sector = "any" if judged.popov_sector is None else lower_end(judged.popov_sector, 4)
         stable = "stable" if judged.theta2_stable else "NOT stable: a lasting offset after saturation"
         click.echo(f"  anti-windup {name:9s} f = {judged.f:.4g}, Popov sector {sector}, theta2 {stable}")
+    click.echo(f"  guarantee of the corrected one: {design.corrected.guarantee}, {design.corrected.guarantee_said}")
 
 
 def _compared(design: Design) -> str:

@@ -22,7 +22,7 @@ from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
 from identification.model.plant_json import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
 
-SCHEMA = 2
+SCHEMA = 3
 KINDS = ("delay-free", "extended")
 
 Named = TypeVar("Named")

@@ -208,7 +208,10 @@ def options(rng: random.Random, cheap: bool) -> Case:
 
 REFERENCE = b"time_s,reference\n0,0\n1,2.5\n3,-1\n"
 
-LONG = ("claims", "pid", "conditions", "limits", "campaign", "trade-off", "sampled-rates", "report", "equations")
+LONG = (
+    *("claims", "pid", "conditions", "limits", "campaign", "trade-off", "sampled-rates", "hidden-modes", "report"),
+    "equations",
+)
 """Commands that take long whatever their options."""
 
 COSTLY = ("audit", "extended", "delay-free", "f-gamma", "interpolation")

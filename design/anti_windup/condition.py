@@ -46,6 +46,7 @@ class Sector:
 
     k: float
     is_scaled = False
+    tighter = ()
 
     def __post_init__(self) -> None:
         if not 0 < self.k < 1:
@@ -119,6 +120,7 @@ class PositiveReal:
     robustness: Robustness | None = None
     is_scaled = True
     least = MARGIN
+    tighter = (1e-3, 5e-3, 2e-2)  # further margins, tried in turn where M falls below 0 between two frequencies
 
     def __post_init__(self) -> None:
         if self.robustness is not None:

@@ -204,7 +204,15 @@ class _Search:
         rate, b = (float(each) for each in self._poles(i, j))
         kind = self.program.compensator(rate, b, x)
         f, _ = searched_norm(self.W_a * kind.one_plus)
-        if not (f < self.wanted and self.condition.holds(kind)):
+        waiting = iter(self.condition.tighter)
+        while f < self.wanted and not self.condition.holds(kind):
+            tighter = next(waiting, None)
+            solved = None if tighter is None else self.program.solve(rate, b, self.wanted, tighter).x
+            if solved is None:
+                return
+            kind = self.program.compensator(rate, b, solved)
+            f, _ = searched_norm(self.W_a * kind.one_plus)
+        if not f < self.wanted:
             return
         below = j - j % COARSE
         beside = [at for at in {below, below + COARSE * (j > below)} if at * RATES <= i * SPREAD]

@@ -138,7 +138,7 @@ class CorrectedProgram:
         left[:, :-1] = -shape.real
         return left, np.full(len(E), 1 - REAL_PART)
 
-    def solve(self, rate: float, b: float, stop: float) -> Vertex:
+    def solve(self, rate: float, b: float, stop: float, tighter: float = 0.0) -> Vertex:
         """The dual simplex method over all frequencies: the most violated condition enters until none is.
 
         Parameters
@@ -147,6 +147,9 @@ class CorrectedProgram:
             Poles in rad/s.
         stop
             The search ends as soon as f is known to be larger.
+        tighter
+            By which the left side of the condition has to exceed ``least``; with another than 0 the vertex is none of
+            :meth:`lower_bounds`.
         """
         first = min(self.below, int(np.searchsorted(self.omega, 1e-3 * rate * (1 - 1e-9))))
         psi, E = self.psi[first:], self._factor(1j * self.omega[first:], rate, b)
@@ -169,7 +172,7 @@ class CorrectedProgram:
                 [
                     (np.abs(value) - f[0]) / max(f[0], 1e-3) * (FEASIBLE / TOLERANCE),
                     REAL_PART - shape.real,
-                    *(self.least - (turned * shape).real),
+                    *(self.least + tighter - (turned * shape).real),
                 ]
             )
             kind, k = np.unravel_index(np.argmax(excess), excess.shape)
@@ -188,7 +191,8 @@ class CorrectedProgram:
             i = self._leaves(left, new[0])
             if i is None:
                 return Vertex((*rows, entering), None)
-            rows[i], left[i], limits[i] = entering, new[0], limit[0]
+            rows[i], left[i] = entering, new[0]
+            limits[i] = limit[0] - (tighter if entering.kind is Kind.CONDITION else 0.0)
         return Vertex(tuple(rows), None)
 
     def _leaves(self, left: Real, new: Real) -> int | None:

@@ -132,7 +132,10 @@ class CorrectedCompensator(Compensator):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        """Read what :meth:`to_dict` writes; raises InputError where its certificate proves nothing."""
+        """Read what :meth:`to_dict` writes; raises InputError where its certificate proves nothing.
+
+        What a robust guarantee needs beside it, the margin for W_a, is a matter of the loop and not proved again.
+        """
         found = super().from_dict(content)
         if found.guarantee not in GUARANTEES:
             raise InputError(f"guarantee is {shown(found.guarantee)}; expected one of {', '.join(GUARANTEES)}")

@@ -1,7 +1,8 @@
 """A storage function of M = 1 + theta1~, which proves that M is positive real, and bounds the windup that is left.
 
-M = 1 + C (sI - A)^-1 b with the poles -p_k, real ones, as a chain: x_1' = p_1 (u~ - x_1), x_k' = p_k (x_(k-1) - x_k).
-Its output is w = M u~ = C x + u~. A storage function is V = x'P x with a positive definite P and
+M = 1 + C (sI - A)^-1 b with the poles -p_k, real ones, the fastest first, as a chain: x_1' = p_1 (u~ - x_1) and
+x_k' = p_k (x_(k-1) - x_k). Its output is w = M u~ = C x + u~. A storage function is V = x'P x with a positive definite
+P and
 
     dV/dt <= 2 u~ w   for every x and u~, that is   [-(A'P + P A), C' - P b; C - b'P, 2] >= 0   (KYP lemma).
 
@@ -85,11 +86,9 @@ def certificate(M: Block) -> Rows:
     rates, at_zero, n = _rates(M), M.zeros.count(0j), len(M.poles)
     real, size = popov_polynomial(M, 0.0), [Fraction(0)] if at_zero else squared_magnitude(M.poles)
     for k in range(1, n + 1):
-        slower = real_polynomial(M.poles[:k])
-        above = combined(Fraction(1), slower[:1], Fraction(-at_zero), slower)
-        size = combined(
-            Fraction(1), size, Fraction(1), squared_on_axis(multiplied(above, real_polynomial(M.poles[k:])))
-        )
+        first, rest = (real_polynomial([complex(-rate) for rate in part]) for part in (rates[:k], rates[k:]))
+        above = combined(Fraction(1), first[:1], Fraction(-at_zero), first)
+        size = combined(Fraction(1), size, Fraction(1), squared_on_axis(multiplied(above, rest)))
     slack = SLACK
     while at_zero > 1 or not_positive_at(factored := combined(Fraction(2), real, -slack, size)[at_zero:]) is not None:
         slack /= 10
@@ -149,7 +148,7 @@ def _rates(M: Block) -> list[Fraction]:
         raise InputError(
             "1 + theta1~ has complex or unstable poles, or another number of zeros; a certificate has none"
         )
-    return [Fraction(-pole.real) for pole in M.poles]
+    return sorted((Fraction(-pole.real) for pole in M.poles), reverse=True)
 
 
 def _chain(rates: Sequence[Fraction]) -> tuple[fmpq_mat, fmpq_mat]:

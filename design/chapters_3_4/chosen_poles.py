@@ -20,7 +20,8 @@ from identification.model.plant import PlantModel
 PEAK = 2.0
 """||S|| that the choice keeps where it can: a modulus margin of 1/2."""
 AHEAD = 10.0  # times the fastest sinusoid of the reference: no faster a loop is chosen
-SLOWEST = 1e-3  # of the fastest a that is tried
+SLOWEST = 1e-3  # of the fastest a that is tried, and
+BELOW = 0.1  # of the slowest root of P and W_a: a is tried down to the lower one
 A_DECADE = 8  # values of a
 RATES = 4  # of the roll-off, a decade
 COARSE = 30  # frequencies a decade
@@ -114,15 +115,17 @@ def chosen_pace(
             top, why = beyond, known
     else:
         top, why = beyond / AHEAD, f"a tenth of {known}"
+    roots = (*plant_block(plant).zeros, *plant_block(plant).poles, *bound_block(bound).zeros, *bound_block(bound).poles)
+    bottom = min(SLOWEST * top, BELOW * min(abs(root) for root in roots if root))
     options: list[_Option] = []
-    for k in range(int(-A_DECADE * np.log10(SLOWEST)) + 1):
+    for k in range(int(A_DECADE * np.log10(top / bottom)) + 1):
         a = top * 10 ** (-k / A_DECADE)
         if any(option.sensitivity <= PEAK and option.pace >= a for option in options):
             break  # no slower a has a faster slowest pole
         options += _options(plant, bound, wanted, a, level)
     if not options:
         raise InputError(
-            f"no closed loop of a pace from {SLOWEST * top:.3g} to {top:.3g} rad/s has |W_a C S| <= {level:g}; "
+            f"no closed loop of a pace from {bottom:.3g} to {top:.3g} rad/s has |W_a C S| <= {level:g}; "
             "expected a tighter W_a or another frequency of the reference"
         )
     calm = [option for option in options if option.sensitivity <= PEAK]
@@ -140,7 +143,7 @@ def _options(
     loop = Loop(plant, bound, wanted, fixed_poles(wanted, a, pairs_of(a, wanted.omegas)))
     omega = frequency_grid(loop.roots, COARSE)[::THIN]
     fastest = fastest_root(plant_block(plant), bound_block(bound))
-    ends = 10 * max(fastest, a), min(a, *wanted.omegas) / 10
+    ends = 10 * max(fastest, a), min((a, *wanted.omegas)) / 10
     rates = np.geomspace(*ends, int(RATES * np.log10(ends[0] / ends[1])) + 2)
     least, found = least_order(plant), []
     for order in range(least, least + MOST_POLES + 1):

@@ -150,7 +150,7 @@ def _rolled_off(
 ) -> tuple[Block, ExtendedParameters]:
     """T_so of any plant, which rolls off as late as W_a allows."""
     plant, bound = model.plant, model.additive_bound
-    wanted, reasons = _possible(plant, bound, omegas, level)
+    wanted, reasons = _possible(plant, bound, omegas, level, model.fit.band if model.fit else (0.0, np.inf))
     order = None
     if a is None:
         pace = chosen_pace(plant, bound, wanted, level, model.fit.band[1] if model.fit else None)
@@ -175,16 +175,16 @@ def _rolled_off(
 
 
 def _possible(
-    plant: PlantModel, bound: AdditiveBound, omegas: tuple[float, ...], level: float
+    plant: PlantModel, bound: AdditiveBound, omegas: tuple[float, ...], level: float, band: tuple[float, float]
 ) -> tuple[TrackingConditions, list[str]]:
     """The conditions that W_a lets a controller meet, without integral action where the model is not known at rest."""
     wanted = tracking_conditions(plant, omegas)
     at_rest = tracking_floor(plant, bound, [0.0]) if plant.integrators == 0 else 0.0
     if at_rest < level or 0 in omegas:
-        require_possible(plant, bound, wanted, level)
+        require_possible(plant, bound, wanted, level, band)
         return wanted, []
     wanted = tracking_conditions(plant, omegas, integral_action=False)
-    require_possible(plant, bound, wanted, level)
+    require_possible(plant, bound, wanted, level, band)
     return wanted, [f"no integral action: |W_a/P| is {at_rest:.3g} at s = 0, above the level {level:g}"]
 
 

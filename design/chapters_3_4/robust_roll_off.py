@@ -136,7 +136,7 @@ def robust_outer_part(
     met: list[Redesign] = []
     best = np.inf
     fast = 10 * max(fastest_root(plant_block(plant), bound_block(bound)), a)
-    slow = min(a, *wanted.omegas) / 100
+    slow = min((a, *wanted.omegas)) / 100
     rates = np.geomspace(fast, slow, int(PER_DECADE * np.log10(fast / slow)) + 2)
     for order in orders:
         tried = rates if order else rates[:1]
@@ -155,8 +155,17 @@ def robust_outer_part(
     )
 
 
-def require_possible(plant: PlantModel, bound: AdditiveBound, wanted: TrackingConditions, level: float) -> float:
-    """The least ||W_a C S|| of any controller that tracks; raises InputError where the level is not above it."""
+def require_possible(
+    plant: PlantModel,
+    bound: AdditiveBound,
+    wanted: TrackingConditions,
+    level: float,
+    band: tuple[float, float] = (0.0, np.inf),
+) -> float:
+    """The least ||W_a C S|| of any controller that tracks; raises InputError where the level is not above it.
+
+    ``band`` is what was measured, rad/s: the error names frequencies in it at which the model is better known.
+    """
     if not 0 < level < 1:
         raise InputError(f"the level of |W_a C S| is {level:g}; expected between 0 and 1")
     at = (*((0.0,) if wanted.at_zero else ()), *wanted.omegas)
@@ -167,22 +176,27 @@ def require_possible(plant: PlantModel, bound: AdditiveBound, wanted: TrackingCo
         accepted = "a level above that, or " if floor < 1 else ""
         raise InputError(
             f"|W_a/P| is {floor:.4g} at {beyond:.6g} rad/s, and so is |W_a C S| for every controller that follows a "
-            f"reference there; expected less than the level {level:g}: {accepted}{_known(plant, bound, level)}"
+            f"reference there; expected less than the level {level:g}: {accepted}{_known(plant, bound, level, band)}"
         )
     return floor
 
 
-def _known(plant: PlantModel, bound: AdditiveBound, level: float) -> str:
-    """Where |W_a/P| is below a level, in words: the widest interval in octaves."""
+def _known(plant: PlantModel, bound: AdditiveBound, level: float, band: tuple[float, float]) -> str:
+    """Where in the band |W_a/P| is below a level, in words: the widest interval in octaves."""
     share = bound_block(bound) * plant_block(plant).without_delay().inverse()
     omega = frequency_grid(share.zeros + share.poles)
+    omega = omega[(omega >= band[0]) & (omega <= band[1])]
     below = np.concatenate([[False], np.abs(share(1j * omega)) < level, [False]])
     starts, ends = np.flatnonzero(np.diff(below.astype(int)) == 1), np.flatnonzero(np.diff(below.astype(int)) == -1) - 1
     if not len(starts):
-        return f"a better known plant (|W_a/P| is below {level:g} nowhere)"
+        measured = " where it was measured" if band[1] < np.inf else ""
+        return f"a tighter W_a, by more poles of it or more alike tests (|W_a/P| is below {level:g} nowhere{measured})"
     widest = int(np.argmax(omega[ends] / omega[starts]))
     low, high = omega[starts[widest]], omega[ends[widest]]
-    return f"a frequency at which the model is better known, such as {low:.4g} to {high:.4g} rad/s"
+    return (
+        f"a frequency at which the model is better known, such as {low:.4g} to {high:.4g} rad/s, or a tighter W_a, by "
+        "more poles of it or more alike tests"
+    )
 
 
 def _proved(

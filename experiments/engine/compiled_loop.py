@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -71,34 +72,40 @@ def compile_loop(
     without it, and what it changes is found in each step. Where nothing sets a step, ``idle_step`` seconds are one.
     ``slews`` says that the last two states are those of an actuator with a rate limit.
     """
-    now, Z_m = loop.delays == 0, np.zeros(len(loop.delays)) if loop.Z_m is None else loop.Z_m
-    if loop.E[now] @ Z_m[now] != 0:
+    now, direct = loop.delays == 0, _direct(loop)
+    if np.any(loop.E[now] @ direct[now] != 0):
         raise InputError("the control reaches itself at once, an algebraic loop; expected a dead time between")
     A, C = loop.A + loop.D[:, now] @ loop.Z[now], loop.C + loop.E[now] @ loop.Z[now]
-    B = loop.B + loop.D[:, now] @ Z_m[now]
-    D, E, Z, Z_m, delays = _merged(loop, Z_m)
+    of_m, of_now, of_u = (loop.D[:, now] @ direct[now]).T
+    A, B, by_u = A + np.outer(of_u, C), loop.B + of_m + of_now, np.outer(of_u, loop.E)
+    D, E, Z, direct, delays = _merged(replace(loop, D=loop.D + by_u), direct)
     brief = delays * max(_fastest(A, B, C), _fastest(A + D @ Z, B, C + E @ Z)) <= most_brief
-    brief &= Z_m == 0
+    brief &= ~direct.any(axis=1)
     A, C = A + D[:, brief] @ Z[brief], C + E[brief] @ Z[brief]
     n, k = len(loop.x0), len(delays)
-    watched, watched_m, groups, lags, reading = _watched(loop)
+    watched, watched_direct, groups, lags, reading = _watched(loop)
     # what u - sat(u) drives is driven by zeros in the loop without saturation, and not by rounding
     free_A, free_D = A + np.outer(B, C), D + np.outer(B, E)
-    u, signals, signals_m = np.concatenate([C, [0.0], E]), np.vstack([Z, watched]), np.append(Z_m, watched_m)
+    u, signals = np.concatenate([C, [0.0], E]), np.vstack([Z, watched])
+    of_m, of_limited, of_u = np.vstack([direct, watched_direct]).T
 
-    def mode(A: np.ndarray, constant: np.ndarray, D: np.ndarray, m: np.ndarray) -> Rows:
-        """Where m is a row over (x, the constant, w)."""
-        read = np.hstack([signals, np.zeros((len(signals), 1 + k))]) + np.outer(signals_m, m)
+    def mode(A: np.ndarray, constant: np.ndarray, D: np.ndarray, m: np.ndarray, limited: np.ndarray) -> Rows:
+        """Where m and sat(u) are rows over (x, the constant, w)."""
+        read = np.hstack([signals, np.zeros((len(signals), 1 + k))]) + np.outer(of_m, m)
+        read += np.outer(of_limited, limited) + np.outer(of_u, u)
         return compressed(np.vstack([np.hstack([A, constant[:, None], D]), u, read]))
 
     units = np.eye(n + 1 + k)
-    unsaturated, saturated = mode(free_A, np.zeros(n), free_D, u), mode(A, B, D, units[n])
+    unsaturated, saturated = mode(free_A, np.zeros(n), free_D, u, u), mode(A, B, D, units[n], units[n])
     modes = [unsaturated, saturated]
     if slews:
-        m, knows = np.eye(n)[-1], np.zeros(n) if loop.B_limits is None else loop.B_limits
+        m, knows = np.eye(n)[-1], (np.zeros(n) if loop.B_limits is None else loop.B_limits) + of_now
         moved = A + np.outer(B - knows, m) + np.outer(m, np.eye(n)[-2])
         free_A, free_D = moved + np.outer(knows, C), D + np.outer(knows, E)
-        modes += [mode(free_A, np.zeros(n), free_D, units[n - 1]), mode(moved, knows, D, units[n - 1])]
+        modes += [
+            mode(free_A, np.zeros(n), free_D, units[n - 1], u),
+            mode(moved, knows, D, units[n - 1], units[n]),
+        ]
 
     fastest = _fastest(A, B, C)
     step = min(FURTHEST / fastest if fastest > 0 else np.inf, most_step)
@@ -133,25 +140,29 @@ def _fastest(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> float:
     return max(float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in (A, A + np.outer(B, C)))
 
 
-def _merged(loop: SaturatedLoop, Z_m: np.ndarray) -> tuple[np.ndarray, ...]:
-    """D, E, Z, Z_m and the dead times of the delayed signals that drive the loop, one for all that enter it alike."""
+def _direct(loop: SaturatedLoop) -> np.ndarray:
+    return np.zeros((len(loop.delays), 3)) if loop.direct is None else loop.direct
+
+
+def _merged(loop: SaturatedLoop, direct: np.ndarray) -> tuple[np.ndarray, ...]:
+    """D, E, Z, direct and the dead times of what drives the loop late, one signal for all that enter it alike."""
     entering: dict[bytes, list[int]] = {}
     for j in range(len(loop.delays)):
-        if loop.delays[j] > 0 and (Z_m[j] != 0 or loop.Z[j].any()) and (loop.E[j] != 0 or loop.D[:, j].any()):
+        if loop.delays[j] > 0 and (direct[j].any() or loop.Z[j].any()) and (loop.E[j] != 0 or loop.D[:, j].any()):
             alike = np.array([loop.delays[j], loop.E[j], *loop.D[:, j]]) + 0.0  # of -0 and 0 one
             entering.setdefault(alike.tobytes(), []).append(j)
     first = [alike[0] for alike in entering.values()]
     Z = np.array([loop.Z[alike].sum(axis=0) for alike in entering.values()]).reshape(len(first), len(loop.x0))
-    summed = np.array([Z_m[alike].sum() for alike in entering.values()])
+    summed = np.array([direct[alike].sum(axis=0) for alike in entering.values()]).reshape(len(first), 3)
     return loop.D[:, first], loop.E[first], Z, summed, loop.delays[first]
 
 
 def _watched(loop: SaturatedLoop) -> tuple[np.ndarray, ...]:
-    """Rows over x and m of what the outputs are made of, where each group begins, its lag, and the outputs' rows."""
+    """What the outputs are made of: rows over x and direct, where each group begins, its lag, and the outputs' rows."""
     used = [j for j in range(len(loop.delays)) if any(w[j] != 0 for _, w in loop.outputs.values())]
     lags = sorted({0.0, *(float(loop.delays[j]) for j in used)})
     rows: list[np.ndarray] = []
-    direct: list[float] = []
+    direct: list[np.ndarray] = []
     groups, own, delayed = [0], {}, {}
     for lag in lags:
         if lag == 0:
@@ -159,12 +170,12 @@ def _watched(loop: SaturatedLoop) -> tuple[np.ndarray, ...]:
                 if x.any():
                     own[name] = len(rows)
                     rows.append(x)
-                    direct.append(0.0)
+                    direct.append(np.zeros(3))
         for j in used:
             if loop.delays[j] == lag:
                 delayed[j] = len(rows)
                 rows.append(loop.Z[j])
-                direct.append(0.0 if loop.Z_m is None else float(loop.Z_m[j]))
+                direct.append(_direct(loop)[j])
         groups.append(len(rows))
     reading = np.zeros((len(loop.outputs), len(rows)))
     for into, (name, (_, w)) in zip(reading, loop.outputs.items(), strict=True):
@@ -173,7 +184,7 @@ def _watched(loop: SaturatedLoop) -> tuple[np.ndarray, ...]:
         for j in used:
             into[delayed[j]] += w[j]
     states = np.array(rows).reshape(len(rows), len(loop.x0))
-    return states, np.array(direct), np.array(groups), np.array(lags), reading
+    return states, np.array(direct).reshape(len(rows), 3), np.array(groups), np.array(lags), reading
 
 
 def _stacked(tables: Sequence[np.ndarray]) -> np.ndarray:

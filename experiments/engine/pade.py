@@ -35,7 +35,7 @@ def with_pade(loop: SaturatedLoop, order: int) -> SaturatedLoop:
     SaturatedLoop
         Without dead times; the approximations' states follow the loop's own.
     """
-    if loop.Z_m is not None and loop.Z_m.any():
+    if loop.direct is not None and loop.direct.any():
         raise InputError("a delayed signal jumps with the actuator; expected a plant with more poles than zeros")
     n = len(loop.x0)
     filters = {k: realize(pade_block(delay, order)) for k, delay in enumerate(loop.delays) if delay > 0}

@@ -40,7 +40,7 @@ NO_RESETS = Resets(np.zeros(0), np.zeros((0, 0)))
 
 @dataclass(frozen=True)
 class SaturatedLoop:
-    """x' = A x + B m + D w, u = C x + E w, m = sat(u), w_j(t) = Z_j x(t - delays_j) + Z_m_j m(t - delays_j).
+    """x' = A x + B m + D w, u = C x + E w, m = sat(u), w_j(t) = (Z_j x + direct_j (m, sat(u), u))(t - delays_j).
 
     Of an actuator with a rate limit m is its output, and x' = A x + (B - B_limits) m + B_limits sat(u) + D w.
 
@@ -59,8 +59,9 @@ class SaturatedLoop:
         Of a reference that is generated piece by piece.
     B_limits
         Shape (n,): the part of B that follows sat(u) at once, and not a slower actuator; zeros unless given.
-    Z_m
-        Shape (k,): what the delayed signals have of m itself; zeros unless given.
+    direct
+        Shape (k, 3): what the delayed signals have of m, of sat(u), which is m but for a rate limit, and of u; zeros
+        unless given.
     """
 
     A: np.ndarray
@@ -74,7 +75,7 @@ class SaturatedLoop:
     outputs: Mapping[str, tuple[np.ndarray, np.ndarray]]
     resets: Resets = NO_RESETS
     B_limits: np.ndarray | None = None
-    Z_m: np.ndarray | None = None
+    direct: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name in ("A", "B", "C", "D", "E", "Z", "x0"):

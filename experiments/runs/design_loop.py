@@ -111,15 +111,12 @@ def plant_loop(
     Raises
     ------
     InputError
-        The plant has as many zeros as poles and no dead time, and the controller passes the error on at once; or the
-        design's own model has as many zeros as poles.
+        The plant has as many zeros as poles and no dead time, and the controller passes the error on at once.
     """
     if plant.relative_degree < 1 and not plant.delay_s and controller.forward.d[0]:
         raise InputError(
             "the true plant has as many zeros as poles and no dead time; expected more poles, or the loop is algebraic"
         )
-    if controller.theta.d.any():
-        raise InputError("the design's model has as many zeros as poles; expected more poles, for its theta2")
     P = realize(plant_block(plant))
     delays = np.array([plant.delay_s, controller.delay_s, controller.delay_s])
     return _assemble(P, controller.forward, controller.feedback, controller.theta, reference, disturbances, delays)
@@ -151,7 +148,7 @@ def _assemble(
             full[places[name]] = part
         return full
 
-    # w = (y, y_d, [T_so v] delayed), functions of the states, but for what y has of m where P is not strictly proper
+    # w = (y, y_d, [T_so v] delayed), functions of the states, and of m and u where P is not strictly proper
     Z = np.stack([row(P=P.C[0], r=P.d[0] * added["input"]), row(theta=theta.C[1]), row(T=feedback.C[0])])
     r, d, measured = (row(r=x) for x in (generator.row, added["output"], added["output"] + added["noise"]))
     e_x, e_w = r - measured, np.array([-1.0, -1.0, 0.0])
@@ -190,5 +187,6 @@ def _assemble(
         | ({"measured": (measured, y)} if disturbances.noise else {}),
         resets=generator.resets,
         B_limits=-row(theta=theta.b),
-        Z_m=np.array([P.d[0], 0.0, 0.0]),
+        # y_d = theta2 u_tilde with u_tilde = u - m
+        direct=np.array([[P.d[0], 0.0, 0.0], [0.0, -theta.d[1], theta.d[1]], [0.0, 0.0, 0.0]]),
     )

@@ -81,8 +81,8 @@ class Verdict:
 
     @property
     def covered(self) -> bool:
-        """Whether the guarantee speaks of the run."""
-        return self.needed_sector < self.guarantee.sector
+        """Whether the guarantee speaks of the run, whose reference is then within the limits."""
+        return self.needed_sector < min(self.guarantee.sector, 1.0)
 
     @property
     def covered_control(self) -> float:
@@ -199,7 +199,7 @@ def verdict(
     never = bool(np.all((low <= control) & (control <= high)))
     needed = np.zeros(len(time_s)) if never else needed_sector(control, steady, limits)
     at, largest = int(np.argmax(needed)), int(np.argmax(np.abs(control)))
-    left = np.flatnonzero(needed >= given.sector)
+    left = np.flatnonzero(needed >= min(given.sector, 1.0))
     return Verdict(
         guarantee=given,
         largest_control=float(abs(control[largest])),

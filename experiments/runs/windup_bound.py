@@ -191,5 +191,6 @@ def with_states(loop: SaturatedLoop, storage: Storage) -> SaturatedLoop:
         D=np.vstack([loop.D, np.outer(storage.b, loop.E)]),
         Z=np.hstack([loop.Z, np.zeros((len(loop.Z), more))]),
         x0=np.append(loop.x0, np.zeros(more)),
+        B_limits=None if loop.B_limits is None else np.append(loop.B_limits, -storage.b),
         outputs={"v": (np.append(v_x, np.zeros(more)), v_w)} | {f"x{k}": (row, none) for k, row in enumerate(rows)},
     )

@@ -174,6 +174,22 @@ def compare(design: Path, limit: float | None, output: Path) -> None:
         write_into(output, comparison_tables(content, reference, positive_limit(limit), bar.update))
 
 
+@thesis.command("hidden-modes")
+@DESIGN
+@LIMIT
+@OUTPUT_FOLDER
+def hidden_modes(design: Path, limit: float | None, output: Path) -> None:
+    """What rounding makes of an hour of the chapter 4 loop: hidden_modes.csv, hidden_modes_summary.csv."""
+    from tqdm import tqdm
+
+    from design.design_file import read_design
+    from experiments.thesis.studies.hidden_modes import hidden_modes_tables
+
+    content = read_design(design, "extended")
+    with tqdm(desc="hidden modes", unit="", disable=None, leave=False) as bar:
+        write_into(output, hidden_modes_tables(content, positive_limit(limit), bar.update))
+
+
 @thesis.command("campaign")
 @plant_options
 @LIMIT

@@ -28,20 +28,15 @@ FIGURES = {
     "sampled": "A.5",
     "compare": "A.8",
     "campaign": "A.6",
+    "hidden_modes": "A.9",
 }
 """What is drawn of each experiment that needs a design."""
 
 FOLLOWING = {
     "delay_free": ("delay_free", "limits_delay_free"),
     "extended": (
-        "f_gamma",
-        "extended",
-        "trade_off",
-        "interpolation",
-        "limits_extended",
-        "sampled",
-        "compare",
-        "campaign",
+        *("f_gamma", "extended", "trade_off", "interpolation", "limits_extended", "sampled", "campaign"),
+        *("hidden_modes", "compare"),
     ),
     "robust": ("robustness",),
 }

@@ -20,7 +20,7 @@ from identification.base.errors import InputError
 from paper_figures import __main__ as command_line
 from paper_figures.look import captions, panels, style
 from paper_figures.thesis.figure_registry import figure_module
-from paper_figures.thesis.figures import fig_2_12, fig_a_05, fig_a_06
+from paper_figures.thesis.figures import fig_2_12, fig_a_05, fig_a_06, fig_a_09
 
 Tables = dict[str, pd.DataFrame]
 
@@ -116,6 +116,15 @@ def sampled_tables() -> Tables:
     return {"sampled": pd.DataFrame(columns), "sampled_summary": summary.assign(**facts)}
 
 
+def hidden_modes_tables() -> Tables:
+    time_s = np.geomspace(0.5, 5120, 400)
+    columns = {"time_s": time_s, "drift_coprime": -0.002 - 0.001 * np.sin(time_s), "drift_thesis": -0.00125 * time_s}
+    summary = {"run": ["coprime", "thesis"], "drift": [-0.00275, -6.125], "largest_drift": [0.003, 6.25]}
+    facts = {"limit": 13.5, "resolution": 27 / 4096, "bits": 12, "rate_hz": 640.0, "duration_s": 5120.0}
+    facts |= {"integrators": 1, "expected_drift": -6.5}
+    return {"hidden_modes": pd.DataFrame(columns), "hidden_modes_summary": pd.DataFrame(summary).assign(**facts)}
+
+
 def campaign_tables() -> Tables:
     """Of every run the last 30 plants of 120 diverge; with the thesis's anti-windup none recovers."""
     parts, distances, rows = [], [], []
@@ -146,6 +155,7 @@ def campaign_tables() -> Tables:
 
 TABLES = {
     "campaign": campaign_tables,
+    "hidden_modes": hidden_modes_tables,
     "limits_extended": limits_tables,
     "sampled": sampled_tables,
     "pid": pid_tables,
@@ -196,7 +206,7 @@ PANELS = {
         signals(signal, run) for run in ("thesis", "corrected") for signal in ("control", "saturated", "control")
     ],
 }
-NAMES = [*PANELS, "fig_2_09", "fig_2_10", "fig_2_11", "fig_a_04", "fig_a_05", "fig_a_06"]
+NAMES = [*PANELS, "fig_2_09", "fig_2_10", "fig_2_11", "fig_a_04", "fig_a_05", "fig_a_06", "fig_a_09"]
 CONTROL_PANELS = [
     *(("fig_2_02", 1, "swapped_none"), ("fig_2_03", 3, "printed_back_calculation")),
     *(("fig_2_13", 0, "thesis"), ("fig_2_13", 1, "corrected"), ("fig_4_04", 2, "thesis"), ("fig_4_04", 5, "corrected")),
@@ -393,6 +403,10 @@ SAID = {
         *("plants", "seed", "limit", "horizon_s", "linear_stable", "diverged", "recovered"),
         *("steady_error_50", "recovery_50_s"),
     ],
+    "fig_a_09": [
+        *("limit", "resolution", "bits", "rate_hz", "duration_s"),
+        *("drift", "largest_drift", "expected_drift"),
+    ],
 }
 
 
@@ -551,6 +565,49 @@ def test_a_drive_that_diverges_is_named(as_pdf):
     assert "does not settle within the run with the drive" in fig_a_05.caption(tables)
     assert "is unbounded and unbounded with held inputs" in fig_a_05.caption(tables)
     as_pdf(figure)
+
+
+def test_the_drift():
+    tables = hidden_modes_tables()
+    table = tables["hidden_modes"]
+    plain, logarithmic = fig_a_09.draw(tables).axes
+    for form, (kind, _) in fig_a_09.FORMS.items():
+        for panel, shown in ((plain, table[f"drift_{form}"]), (logarithmic, table[f"drift_{form}"].abs())):
+            ((x, y),) = of_kind(panel, kind)
+            np.testing.assert_array_equal(x, table["time_s"])
+            np.testing.assert_array_equal(y, shown)
+    caption = fig_a_09.caption(tables)
+    for said in (
+        "at 0.64 kHz, by Tustin's rule, for 5120 s of",
+        "a multiple of 0.00659, 1/2^12 of the range",
+        "ends at -6.12, its largest size is 6.25; half a step, which is cut off on average, makes -K (step/2) t = -6.5",
+        "ends at -0.00275, its largest size is 0.003.",
+    ):
+        assert said in caption
+
+
+@pytest.mark.parametrize(("integrators", "growth"), [(0, "(step/2) = -6.5"), (2, "(step/2) t^2/2 = -6.5")])
+def test_the_drift_that_half_a_step_makes(integrators, growth):
+    tables = hidden_modes_tables()
+    tables["hidden_modes_summary"]["integrators"] = integrators
+    (_, line), *_ = of_kind(fig_a_09.draw(tables).axes[0], "reference")
+    np.testing.assert_allclose(line, -6.5 * (tables["hidden_modes"]["time_s"] / 5120) ** integrators)
+    assert growth in fig_a_09.caption(tables)
+
+
+def test_a_drift_that_diverges_is_not_drawn(as_pdf):
+    tables = hidden_modes_tables()
+    tables["hidden_modes"]["drift_thesis"] = np.nan
+    summary = tables["hidden_modes_summary"]
+    summary.loc[summary["run"] == "thesis", ["drift", "largest_drift"]] = np.nan
+    summary["expected_drift"] = np.nan
+    caption = fig_a_09.caption(tables)
+    assert "no feedback corrects it. The loop diverges. Without" in caption
+    figure = fig_a_09.draw(tables)
+    assert not of_kind(figure.axes[0], "reference")
+    as_pdf(figure)
+    tables["hidden_modes"]["drift_coprime"] = np.nan
+    as_pdf(fig_a_09.draw(tables))
 
 
 def at(line: tuple[np.ndarray, np.ndarray], values: np.ndarray) -> np.ndarray:

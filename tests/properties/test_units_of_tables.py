@@ -19,11 +19,12 @@ from design.design_file import Design
 from experiments.campaign.draw_plants import PlantsWithin
 from experiments.campaign.run_plants import Campaign, code_sha256, run_chunk
 from experiments.thesis.printed_choices import thesis_reference
-from experiments.thesis.studies import f_gamma, interpolation, trade_off
+from experiments.thesis.studies import f_gamma, hidden_modes, interpolation, trade_off
 from experiments.thesis.studies.additive_error import additive_error_tables
 from experiments.thesis.studies.chapter_2 import delay_free_tables
 from experiments.thesis.studies.chapter_4 import desaturation, extended_tables, usual_limit
 from experiments.thesis.studies.f_gamma import f_gamma_tables
+from experiments.thesis.studies.hidden_modes import hidden_modes_tables
 from experiments.thesis.studies.interpolation import interpolation_tables
 from experiments.thesis.studies.robustness import robustness_tables
 from experiments.thesis.studies.sampled_rates import sampled_rates_tables
@@ -46,7 +47,8 @@ OF_TIME = {"time_s", "alpha", "beta", "beta_best", "delay_s"}
 OF_RATE = {"omega", "peak_omega", "a", "lowest", "highest", "rate_hz", "root", "shown_hz", "bandwidth"}
 OF_RATE |= {"largest_ratio_omega"}
 OF_OUTPUT = ("reference", "output_", "error_", "offset", "ripple", "peak_error", "steady_error")
-OF_INPUT = ("control_", "saturated_", "required", "largest_control", "covered_control", "quantum")
+OF_DRIFT = ("drift", "largest_drift", "expected_drift")  # outputs, far smaller than the reference
+OF_INPUT = ("control_", "saturated_", "required", "largest_control", "covered_control", "quantum", "resolution")
 OF_GAIN = {"f", "f_best", "error", "bound", "plant"}
 
 
@@ -64,7 +66,7 @@ def factor(column: str, units: Units) -> float:
         return abs(units.gain)
     if column.startswith(OF_INPUT) or column == "limit":
         return units.input if column.startswith(("control_", "saturated_")) else abs(units.input)
-    return units.output if column.startswith(OF_OUTPUT) else 1.0
+    return units.output if column.startswith((*OF_OUTPUT, *OF_DRIFT)) else 1.0
 
 
 def same_tables(found: Tables, expected: Tables, units: Units, share: float, but: tuple[str, ...] = ()) -> None:
@@ -106,6 +108,15 @@ def test_the_limit_of_chapter_4(small_designs: dict[str, Design], units: Units) 
 def test_sampled_rates(small_designs: dict[str, Design], units: Units) -> None:
     own = small_designs["extended"]
     tables = [sampled_rates_tables(each.design(own), LIMIT * abs(each.input)) for each in (units, Units())]
+    same_tables(*tables, units, 1e-8)
+
+
+@pytest.mark.parametrize("units", [Units(1e9, 1.0, 1e15), Units(2.0**-20, 1.0, 2.0**10)], ids=str)
+def test_hidden_modes(small_designs: dict[str, Design], units: Units, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The input keeps its sign: to cut down is to cut up with the other."""
+    monkeypatch.setattr(hidden_modes, "PERIODS", 20)
+    own = small_designs["extended"]
+    tables = [hidden_modes_tables(each.design(own), LIMIT * each.input) for each in (units, Units())]
     same_tables(*tables, units, 1e-8)
 
 

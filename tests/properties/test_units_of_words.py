@@ -13,9 +13,10 @@ from other_units import Units
 from design.design_file import Design
 from experiments.runs.guarantee import Guarantee, sector_text
 from experiments.runs.sector_promise import Verdict
-from experiments.thesis.studies import interpolation
+from experiments.thesis.studies import hidden_modes, interpolation
 from experiments.thesis.studies.chapter_2 import delay_free_tables
 from experiments.thesis.studies.chapter_4 import extended_tables
+from experiments.thesis.studies.hidden_modes import hidden_modes_tables
 from experiments.thesis.studies.interpolation import interpolation_tables
 from experiments.thesis.studies.sampled_rates import sampled_rates_tables
 from identification.base.digits import told_apart
@@ -23,7 +24,7 @@ from paper_figures.look.captions import apart, duration, number, sampling_rate
 from paper_figures.summary.of_designs import loop_table, sentences
 
 RANGE = re.compile(r"(?:from|between) (\S+)(?: \w+)? (?:to|and) (\S+)")
-FIGURES = ("2_12", "2_13", "2_14", "4_01", "4_02", "4_03", "4_04", "a_02", "a_05")
+FIGURES = ("2_12", "2_13", "2_14", "4_01", "4_02", "4_03", "4_04", "a_02", "a_05", "a_09")
 
 
 @pytest.mark.parametrize("units", [Units(1e9, 1.0, 1e15), Units(1e-9, 1.0, -1e-15), Units(1e5)], ids=str)
@@ -32,10 +33,12 @@ def test_captions_and_summaries(
 ) -> None:
     monkeypatch.setattr(interpolation, "FREQUENCIES", 12)
     monkeypatch.setattr(interpolation, "_poles_are_stable", lambda omega_delay, a_delay: 0)
+    monkeypatch.setattr(hidden_modes, "PERIODS", 20)
     own = {kind: units.design(design) for kind, design in small_designs.items()}
     limit = 40.0 * abs(units.input)
     tables = extended_tables(own["extended"]) | delay_free_tables(own["delay-free"], limit)
     tables |= interpolation_tables(own["extended"]) | sampled_rates_tables(own["extended"], limit)
+    tables |= hidden_modes_tables(own["extended"], limit)
     said = [import_module(f"paper_figures.thesis.figures.fig_{name}").caption(tables) for name in FIGURES]
     summaries = {name: tables[f"{name}_summary"] for name in ("extended", "delay_free")}
     named = {name: own[name.replace("_", "-")] for name in summaries}

@@ -27,10 +27,12 @@ from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design, read_design
 from experiments.__main__ import main
 from experiments.campaign.distributions import campaign_tables
+from experiments.thesis.studies import hidden_modes
 from experiments.thesis.studies.additive_error import additive_error_tables
 from experiments.thesis.studies.chapter_2 import delay_free_tables
 from experiments.thesis.studies.chapter_4 import extended_tables
 from experiments.thesis.studies.f_gamma import f_gamma_tables
+from experiments.thesis.studies.hidden_modes import hidden_modes_tables
 from experiments.thesis.studies.interpolation import interpolation_tables
 from experiments.thesis.studies.pid import pid_tables
 from experiments.thesis.studies.robustness import robustness_tables
@@ -39,7 +41,7 @@ from experiments.thesis.studies.trade_off import trade_off_tables
 from identification.sweeps.read_sweeps import read_sweeps
 from paper_figures.thesis.figure_registry import figure_module, figure_names
 
-LOOPS = ("pid", "delay_free", "extended", "sampled")
+LOOPS = ("pid", "delay_free", "extended", "sampled", "hidden_modes")
 EXPERIMENTS = (*LOOPS, "additive_error", "f_gamma", "trade_off", "interpolation", "robustness", "campaign")
 TABLES = [*(f"{name}{part}" for name in EXPERIMENTS for part in ("", "_summary"))]
 TABLES += ["interpolation_map", "campaign_distance"]
@@ -128,9 +130,17 @@ def tables(extended_design: Design, stored_design: Design, campaign: Path) -> di
         | trade_off_tables(extended_design)
         | interpolation_tables(extended_design)
         | sampled_rates_tables(extended_design)
+        | short_hidden_modes(extended_design)
         | campaign_tables(campaign)
         | robustness_tables({"design_extended": extended_design, "design_robust": robust})
     )
+
+
+def short_hidden_modes(design: Design) -> dict[str, pd.DataFrame]:
+    """Those of Fig. A.9 for a minute and a half instead of an hour."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(hidden_modes, "PERIODS", 20)
+        return hidden_modes_tables(design)
 
 
 def columns_of(table: pd.DataFrame) -> dict[str, np.ndarray]:

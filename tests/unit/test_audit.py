@@ -174,10 +174,10 @@ def test_a_bad_theta1_is_refused(path: Path, tmp_path: Path, options: list[str],
 
 
 def test_a_design_of_an_earlier_version_is_refused(path: Path) -> None:
-    path.write_text(path.read_text(encoding="utf-8").replace('"schema": 2', '"schema": 1'), encoding="utf-8")
+    path.write_text(path.read_text(encoding="utf-8").replace('"schema": 3', '"schema": 1'), encoding="utf-8")
     result = CliRunner().invoke(main, ["audit", str(path)])
     assert result.exit_code == 2
-    assert "schema is 1; expected 2" in result.output
+    assert "schema is 1; expected 3" in result.output
 
 
 def test_the_robust_sector_sees_a_narrow_resonance_of_the_bound(implied: IdentifiedModel) -> None:

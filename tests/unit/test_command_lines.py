@@ -164,7 +164,7 @@ def test_design_refuses_a_missing_folder(runner: CliRunner, tmp_path: Path) -> N
 
 
 SINUSOID = ["--amplitude", "50", "--phase", "1"]
-APPENDIX = ["trade-off", "interpolation", "robustness", "limits", "sampled-rates"]
+APPENDIX = ["trade-off", "interpolation", "robustness", "limits", "sampled-rates", "hidden-modes"]
 SIMULATE = ["--limit", "12", "--anti-windup", "thesis", "--until", "1", "--sample-time", "0.01", *SINUSOID]
 
 

@@ -14,6 +14,7 @@ from design.chapters_3_4.tracking import outer_part, tracking_conditions
 from design.design_file import Design, read_design
 from design.stability.characteristic_roots import roots_right_of
 from design.stability.margins import delay_loop
+from experiments.drive.sampled_loop import Drive, simulate_sampled
 from experiments.runs.references import sinusoid
 from experiments.runs.simulate_design import simulate_design
 from identification.base.errors import InputError
@@ -181,3 +182,21 @@ def test_reasons_and_inner_factor_survive_the_file(design: Design, tmp_path) -> 
     assert again.controller_parts() == design.controller_parts()
     changed = dataclasses.replace(again, plant=dataclasses.replace(again.plant, gain=again.plant.gain * 2))
     assert changed.controller_parts()[1] == design.controller_parts()[1]
+
+
+@pytest.mark.parametrize("delay_s", [0.02, 0.0])
+@pytest.mark.parametrize("kind", ["none", "corrected"])
+def test_a_plant_that_jumps_with_its_input_runs_like_its_sampled_loop(delay_s: float, kind: str) -> None:
+    """With as many zeros as poles y and y_d have a direct part; the computer shares no code with the engine."""
+    plant = PlantModel(5.0, (), (), delay_s, 0, (40.0,), (3.0,))
+    design = design_extended(IdentifiedModel(plant, bound_of(plant, 2.0)), [2.0])
+    reference = sinusoid(1.0, 2.0)
+    limit = 0.8 * reference.required(plant).value
+    run = simulate_design(design, limit, reference, kind, until_s=5.0, samples=1001)
+    assert len(run.events_s) > 4
+    apart = []
+    for rate in (800.0, 3200.0):
+        drive = Drive(rate, "tustin", (-limit, limit))
+        sampled = simulate_sampled(design, reference, kind, drive, 5.0)
+        apart.append(np.abs(sampled.output[:: round(rate / 200)] - run.outputs["output"]).max())
+    assert apart[1] < apart[0] / 3 < 0.01

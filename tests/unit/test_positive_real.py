@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from design.__main__ import main
 from design.anti_windup.chosen_guarantee import chosen_guarantee, why_not_global
 from design.anti_windup.compensator import from_one_plus
 from design.anti_windup.condition import PositiveReal, Robustness, Sector, is_positive_real
@@ -115,7 +117,23 @@ def test_the_least_f_is_that_of_a_convex_program(implied: IdentifiedModel, robus
     assert found.f <= 1.01 * program.value
 
 
-@pytest.mark.parametrize("M", [WASHOUT, LAG, NOTCH, Block(1.0)], ids=["washout", "lag", "notch", "one"])
+def test_what_falls_below_zero_between_two_frequencies_is_solved_more_tightly() -> None:
+    modes = (Mode(1.22, 0.00131), Mode(112.0, 0.0525), Mode(266.0, 0.425))
+    bound = AdditiveBound(0.00381, (), modes, (74.8, 9430.0, 633.0, 1.7, 4350.0, 293.0), (30900.0, 88400.0))
+    found = corrected((), bound, 5.0, PositiveReal(), 246.0, False)
+    assert found.f_lower <= found.f <= 1.001 * found.f_lower  # 1.0097 without
+
+
+SLOW_AND_FAST = Block(
+    1.0,
+    (0j, -0.64167 + 42.122j, -0.64167 - 42.122j, -219.91 + 0j, -1155.8 + 0j),
+    (-0.15790 + 0j, *(complex(-104.72),) * 4),
+)
+
+
+@pytest.mark.parametrize(
+    "M", [WASHOUT, LAG, NOTCH, SLOW_AND_FAST, Block(1.0)], ids=["washout", "lag", "notch", "slow and fast", "one"]
+)
 def test_the_certificate_dissipates(M: Block) -> None:
     """2 x'P (A x + b u~) <= 2 u~ (C x + u~) for any x and u~, and C, A, b are M's."""
     storage = proved_storage(M, certificate(M))
@@ -218,6 +236,20 @@ def test_which_plants_have_a_global_guarantee() -> None:
             chosen_guarantee((0j,), asked, sector, None)
     with pytest.raises(InputError, match="the guarantee is 'global', but no guarantee for every control exists"):
         chosen_guarantee((0j, 0j), "global", None, None)
+
+
+def test_the_command_takes_a_guarantee(tmp_path: Path) -> None:
+    output = tmp_path / "design.json"
+    options = ["extended", "implied", "--reference-omega", "1.5", "--a", "4", "--e", "2", "--f", "1"]
+    options += ["--output", str(output), "--guarantee"]
+    refused = CliRunner().invoke(main, [*options, "robust"])
+    assert refused.exit_code == 2
+    assert "|W_a C S| reaches 8.84 at 175 rad/s; a robust guarantee expects less than 1/2" in refused.output
+    assert not output.exists()
+    result = CliRunner().invoke(main, [*options, "robust", "--robust-level", "0.3"])
+    assert result.exit_code == 0, result.output
+    assert "guarantee of the corrected one: robust, for every plant within W_a the windup ends" in result.output
+    assert read_design(output).corrected.guarantee == "robust"
 
 
 def test_a_plant_without_integrator_keeps_the_smaller_f() -> None:

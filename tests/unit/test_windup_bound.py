@@ -19,7 +19,9 @@ from experiments.runs.guarantee import guarantee
 from experiments.runs.references import Reference, sinusoid
 from experiments.runs.sector_promise import Verdict, judge_run, steady_control
 from experiments.runs.windup_bound import after_run_of_any_plant, before_run, with_states
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
+from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 from tests.unit.test_sector_promise import CHAPTER_4, LIMIT_CYCLE
 
@@ -173,6 +175,23 @@ def test_every_plant_within_the_bound_keeps_its_own(implied: IdentifiedModel) ->
     assert found_run.windup is not None
     assert found_run.windup.stored is None
     assert str(found_run).startswith("Guaranteed whatever the control: from t = ")
+
+
+@pytest.mark.parametrize("omega", [0.0, 1.5])
+def test_a_plant_without_integrator(implied: IdentifiedModel, omega: float) -> None:
+    """A constant takes a control too; beyond the limits nothing is promised, however large the sector is."""
+    plant = PlantModel(2.0, (), (Mode(30.0, 0.1),), 0.01, integrators=0, real_poles=(4.0,))
+    bound = AdditiveBound.printed_form(0.01, 5.0, 40.0, 0.1)
+    design = design_extended(dataclasses.replace(implied, plant=plant, additive_bound=bound), [omega])
+    reference = sinusoid(1.0, omega, np.pi / 2, 0.0)
+    within, beyond = (judged(design, limit, reference, 6.0) for limit in (0.7, 0.3))
+    assert within.guarantee.sector >= 1
+    assert within.windup is not None
+    assert within.windup.stored is not None
+    assert within.windup.bound is not None
+    assert within.windup.was <= within.windup.stored <= within.windup.bound.most
+    assert not beyond.covered
+    assert "NOT covered by its guarantee: the reference takes a control of 0.5" in str(beyond)
 
 
 def test_what_left_its_sector_for_a_limit_cycle_settles() -> None:

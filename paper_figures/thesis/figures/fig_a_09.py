@@ -1,0 +1,77 @@
+"""Fig. A.9: the drift that rounding inside the controller causes, in the thesis's form and without hidden modes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from paper_figures.look import panels
+from paper_figures.look.captions import duration, number, of_run, only, sampling_rate
+from paper_figures.look.style import FULL_WIDTH, LINES, styled
+
+TABLES: tuple[str, ...] = ("hidden_modes", "hidden_modes_summary")
+
+FORMS = {
+    "thesis": ("thesis anti-windup", "thesis's form"),
+    "coprime": ("corrected anti-windup", "without hidden modes"),
+}
+GROWTH = {0: "", 1: " t", 2: " t^2/2"}
+
+
+def caption(tables: Mapping[str, pd.DataFrame]) -> str:
+    """Return the caption with the numbers of the tables."""
+    summary = tables["hidden_modes_summary"]
+    bits, resolution, limit = (only(summary, column) for column in ("bits", "resolution", "limit"))
+    return (
+        "What rounding inside the controller makes of the output (not in the thesis): the loop of chapter 4 on a "
+        f"computer at {sampling_rate(only(summary, 'rate_hz'))}, by Tustin's rule, for "
+        f"{duration(only(summary, 'duration_s'), 4)} of the thesis's reference, under the limits +-{number(limit)} and "
+        f"with the corrected anti-windup. The computer cuts v down to a multiple of {number(resolution)}, 1/2^{bits:g} "
+        "of the range between the limits. The drift, in the unit of y, is the output of this run less that of a run "
+        "without rounding. (a) As drawn in Fig. 2.6, K and 1/(1 - T_so T_si) hide the plant's poles in Re s >= 0: what "
+        "is rounded between the two reaches y through the plant, and no feedback corrects it. "
+        f"{_said(summary, 'thesis')}{_expected(summary)}. Without hidden modes the controller is the same transfer "
+        f"function, and the loop corrects what is rounded in it. {_said(summary, 'coprime')}. (b) The size of the same "
+        "drift on logarithmic axes."
+    )
+
+
+def _said(summary: pd.DataFrame, form: str) -> str:
+    drift, largest = (of_run(summary, form, column) for column in ("drift", "largest_drift"))
+    if math.isnan(drift):
+        return "The loop diverges"
+    return f"The drift ends at {number(drift)}, its largest size is {number(largest)}"
+
+
+def _expected(summary: pd.DataFrame) -> str:
+    """The drift that half a step makes, if the plant has one to compare with."""
+    expected = only(summary, "expected_drift")
+    if math.isnan(expected):
+        return ""
+    growth = GROWTH[int(only(summary, "integrators"))]
+    return f"; half a step, which is cut off on average, makes -K (step/2){growth} = {number(expected)} (dashed)"
+
+
+@styled()
+def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
+    """Return the figure."""
+    table, summary = tables["hidden_modes"], tables["hidden_modes_summary"]
+    axes = panels.lettered(FULL_WIDTH, 2.7, "ab")
+    time_s = table["time_s"]
+    for form, (kind, label) in FORMS.items():
+        drift = table[f"drift_{form}"]
+        axes["a"].plot(time_s, drift, **LINES[kind], label=label)
+        axes["b"].loglog(time_s, drift.abs(), **LINES[kind])
+    expected = only(summary, "expected_drift")
+    if not math.isnan(expected):
+        line = expected * (time_s / only(summary, "duration_s")) ** only(summary, "integrators")
+        axes["a"].plot(time_s, line, **LINES["reference"])
+        axes["b"].loglog(time_s, line.abs(), **LINES["reference"], label="half a step")
+        axes["b"].legend(**panels.ABOVE)
+    axes["a"].set(xlabel="Time $t$ [s]", ylabel="Drift of the output $y$", xlim=(0, time_s.iloc[-1]))
+    axes["b"].set(xlabel="Time $t$ [s]", ylabel="Size of the drift", xlim=(time_s.iloc[0], time_s.iloc[-1]))
+    axes["a"].legend(**panels.ABOVE, ncols=2)
+    return axes["a"].figure  # type: ignore[return-value]
