@@ -87,6 +87,8 @@ def comparison_tables(
     """
     true = design.loop_plant if plant is None else plant
     required = reference.required(true).value
+    if limit is None and not 0 < required < np.inf:
+        raise InputError(f"the control that the reference needs reaches {required:g}, from which no limit follows")
     limit = MULTIPLE * required if limit is None else limit
     if not 0 < limit < np.inf:
         raise InputError(f"the limit is {limit:g}; expected a positive finite number")
