@@ -1,8 +1,8 @@
 """The anti-windups of least L2 gain from v, the control of the loop without saturation, to y_d, by linear matrix
 inequalities.
 
-With u = v - c x, y_d = c_d x + d u~ and x' = A x + b u~, u~ = u - sat(u) meets u~ (k u - u~) >= 0 as long as the dead zone is
-in the sector k: of every u for k = 1, of |u| <= L/(1 - k) below. V = x'Q^-1 x proves the gain gamma if
+With u = v - c x, y_d = c_d x + d u~ and x' = A x + b u~, u~ = u - sat(u) meets u~ (k u - u~) >= 0 as long as the dead
+zone is in the sector k: of every u for k = 1, of |u| <= L/(1 - k) below. V = x'Q^-1 x proves the gain gamma if
 
     dV/dt + y_d^2/gamma - gamma v^2 + (2/U) u~ (k (v - c x) - u~) < 0   for all (x, u~, v) but 0,
 

@@ -34,22 +34,10 @@ EXTENDED = {
     *("results/hidden_modes.csv", "results/hidden_modes_summary.csv"),
     *(
         f"figures/fig_{n}.{kind}"
-        for n in [
-            "2_10",
-            "2_11",
-            "4_01",
-            "4_02",
-            "4_03",
-            "4_04",
-            "a_01",
-            "a_02",
-            "a_03",
-            "a_04",
-            "a_05",
-            "a_06",
-            "a_08",
-            "a_09",
-        ]
+        for n in (
+            *("2_10", "2_11", "4_01", "4_02", "4_03", "4_04"),
+            *("a_01", "a_02", "a_03", "a_04", "a_05", "a_06", "a_08", "a_09"),
+        )
         for kind in ("pdf", "svg", "png", "txt")
     ),
 }
