@@ -9,7 +9,6 @@ import numpy as np
 from design.blocks.block import Block
 from design.blocks.state_space import block_diagonal, realize
 from experiments.engine.saturated_loop import SaturatedLoop
-from identification.base.errors import InputError
 
 
 def pade_block(delay_s: float, order: int) -> Block:
@@ -33,33 +32,35 @@ def with_pade(loop: SaturatedLoop, order: int) -> SaturatedLoop:
     Returns
     -------
     SaturatedLoop
-        Without dead times; the approximations' states follow the loop's own.
+        With dead times of zero; the approximations' states follow the loop's own.
     """
-    if loop.direct is not None and loop.direct.any():
-        raise InputError("a delayed signal jumps with the actuator; expected a plant with more poles than zeros")
-    n = len(loop.x0)
-    filters = {k: realize(pade_block(delay, order)) for k, delay in enumerate(loop.delays) if delay > 0}
+    n, k = len(loop.x0), len(loop.delays)
+    direct = np.zeros((k, 3)) if loop.direct is None else loop.direct
+    filters = {j: realize(pade_block(delay, order)) for j, delay in enumerate(loop.delays) if delay > 0}
     extra = order * len(filters)
     A = block_diagonal(loop.A, *(part.A for part in filters.values()))
-    Z = np.hstack([loop.Z, np.zeros((len(loop.delays), extra))])
-    # w_k = row_k x for the extended state
-    rows = Z.copy()
-    for position, (k, part) in enumerate(filters.items()):
+    B, D = np.append(loop.B, np.zeros(extra)), np.vstack([loop.D, np.zeros((extra, k))])
+    Z, at_once = np.hstack([loop.Z, np.zeros((k, extra))]), direct.copy()
+    for position, (j, part) in enumerate(filters.items()):
         place = slice(n + position * order, n + (position + 1) * order)
-        A[place, :n] = np.outer(part.b, loop.Z[k])
-        rows[k] *= part.d[0]
-        rows[k, place] = part.C[0]
+        of_limited, of_u = direct[j, 0] + direct[j, 1], direct[j, 2]
+        A[place, :n] = np.outer(part.b, loop.Z[j] + of_u * loop.C)
+        D[place] = np.outer(part.b, of_u * loop.E)
+        B[place] = part.b * of_limited
+        Z[j] *= part.d[0]
+        Z[j, place] = part.C[0]
+        at_once[j] *= part.d[0]
     pad = np.zeros(extra)
-    A[:n] += loop.D @ rows
     return SaturatedLoop(
         A=A,
-        B=np.concatenate([loop.B, pad]),
-        C=np.concatenate([loop.C, pad]) + loop.E @ rows,
-        D=np.zeros((n + extra, 0)),
-        E=np.zeros(0),
-        Z=np.zeros((0, n + extra)),
-        delays=np.zeros(0),
-        x0=np.concatenate([loop.x0, pad]),
-        B_limits=None if loop.B_limits is None else np.concatenate([loop.B_limits, pad]),
-        outputs={name: (np.concatenate([x, pad]) + w @ rows, np.zeros(0)) for name, (x, w) in loop.outputs.items()},
+        B=B,
+        C=np.append(loop.C, pad),
+        D=D,
+        E=loop.E,
+        Z=Z,
+        delays=np.zeros(k),
+        x0=np.append(loop.x0, pad),
+        B_limits=None if loop.B_limits is None else np.append(loop.B_limits, pad),
+        outputs={name: (np.append(x, pad), w) for name, (x, w) in loop.outputs.items()},
+        direct=None if loop.direct is None else at_once,
     )

@@ -15,6 +15,9 @@ from design.design_file import Design, read_design
 from design.stability.characteristic_roots import roots_right_of
 from design.stability.margins import delay_loop
 from experiments.drive.sampled_loop import Drive, simulate_sampled
+from experiments.engine.pade import with_pade
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
 from experiments.runs.references import sinusoid
 from experiments.runs.simulate_design import simulate_design
 from identification.base.errors import InputError
@@ -200,3 +203,18 @@ def test_a_plant_that_jumps_with_its_input_runs_like_its_sampled_loop(delay_s: f
         sampled = simulate_sampled(design, reference, kind, drive, 5.0)
         apart.append(np.abs(sampled.output[:: round(rate / 200)] - run.outputs["output"]).max())
     assert apart[1] < apart[0] / 3 < 0.01
+
+
+def test_pades_approximation_of_a_plant_that_jumps_with_its_input_tends_to_its_dead_time() -> None:
+    plant = PlantModel(5.0, (), (), 0.02, 0, (40.0,), (3.0,))
+    design = design_extended(IdentifiedModel(plant, bound_of(plant, 2.0)), [2.0])
+    reference = sinusoid(1.0, 2.0)
+    loop, limit = design_loop(design, reference, "corrected"), 0.9 * reference.required(plant).value
+    time_s = np.linspace(0.0, 6.0, 601)
+    exact = simulate(loop, (-limit, limit), time_s).outputs["output"]
+    apart = [
+        np.abs(simulate(with_pade(loop, order), (-limit, limit), time_s).outputs["output"] - exact).max()
+        for order in (1, 3, 6)
+    ]
+    assert apart[0] > 2 * apart[1] > 2.5 * apart[2]
+    assert apart[2] < 1e-3
