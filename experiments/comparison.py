@@ -9,6 +9,7 @@ import pandas as pd
 
 from design.anti_windup.compensator import AntiWindup, uncertainty_cost
 from design.anti_windup.other_anti_windups import OTHERS
+from design.blocks.block import plant_block
 from design.design_file import Design
 from experiments.engine.simulate import Run, simulate
 from experiments.physical_limits.least_peak_error import RestLimit
@@ -92,7 +93,7 @@ def comparison_tables(
     limit = MULTIPLE * required if limit is None else limit
     if not 0 < limit < np.inf:
         raise InputError(f"the limit is {limit:g}; expected a positive finite number")
-    period = span(design, reference)
+    period = _period(design, reference)
     time_s = np.linspace(0.0, 2 * PERIODS * period, 2 * PERIODS * SAMPLES + 1)
     begin = PERIODS * period
     disturbances = Disturbances(input=steps([(limit, begin), (0.0, begin + PULSE * period)]))
@@ -132,6 +133,14 @@ def anti_windups(design: Design) -> tuple[dict[str, AntiWindup | None], dict[str
         except InputError as error:
             refused[name] = str(error)
     return found, refused
+
+
+def _period(design: Design, reference: Reference) -> float:
+    """The reference's period in seconds; of a constant, long enough for the loop and for the plant's own modes."""
+    if np.isfinite(reference.period_s):
+        return reference.period_s
+    rates = [-pole.real for pole in plant_block(design.loop_plant).poles if pole.real < 0]
+    return max(span(design, reference), float(np.log(1 / SETTLED)) / min(rates, default=np.inf))
 
 
 def _promised(design: Design, kind: AntiWindup | None, plant: PlantModel) -> dict[str, object]:

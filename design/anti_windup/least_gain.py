@@ -187,7 +187,8 @@ def _solve(
         raise InputError(f"the linear matrix inequality has no solution for the sector {k:g} ({problem.status})")
     found = float(gain.value[0, 0])
     gain.value = (1 + SPARE) * gain.value
-    size = np.sqrt(np.abs(np.diag(inequality.value)))
+    sizes = np.concatenate([np.diag(Q.value), U.value.ravel(), gain.value.ravel(), gain.value.ravel()])
+    size = np.sqrt(np.maximum(sizes, np.finfo(float).tiny))
     eigenvalues = np.linalg.eigvalsh(inequality.value / np.outer(size, size))
     if not (eigenvalues[-1] <= ROUNDING * -eigenvalues[0] and np.linalg.eigvalsh(Q.value)[0] > 0):
         raise InputError(f"the linear matrix inequality is not solved to rounding for the sector {k:g}")
