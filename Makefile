@@ -43,7 +43,7 @@ help: ## say what there is
 	@echo 'make refit ... LIMIT=5    under other saturation limits than the thesis'"'"'s; REPORT=yes for the report too'
 	@echo 'make ... PLANTS=10000    as many plants drawn within W_a, 200 otherwise (Fig. A.6); JOBS=1 one step at a time'
 	@echo 'make ... FORCE=yes    replace files of yours that stand in the place of an output'
-figures: $(READY) ## draw the thesis's figures and A.1 to A.8 into build/figures
+figures: $(READY) ## draw the thesis's figures and A.1 to A.9 into build/figures
 	@$(PY) -m antiwindup.from_make figures
 report: $(READY) ## put verdicts, figures with data, ledger, fit, audits and hashes on one page, build/report/index.html
 	@$(PY) -m antiwindup.from_make report
