@@ -113,12 +113,14 @@ class Design:
         as they are asked for. Raises InputError where there is no such anti-windup.
         """
         if isinstance(asked, str):
-            if asked not in self.anti_windup and asked != "none":
-                from design.anti_windup.other_anti_windups import OTHERS  # only here: nothing else needs them
+            if asked == "none" or asked in self.anti_windup:
+                return None if asked == "none" else self.compensator(asked)
+            from design.anti_windup.other_anti_windups import OTHERS  # only here: nothing else needs them
 
-                if asked in OTHERS:
-                    return OTHERS[asked](self.linear_loop)
-            return None if asked == "none" else self.compensator(asked)
+            if asked not in OTHERS:
+                known = f"the design has {', '.join(self.anti_windup)}; of others there are {', '.join(OTHERS)}"
+                raise InputError(f"there is no anti-windup '{asked}'; {known}")
+            return OTHERS[asked](self.linear_loop)
         return asked.kind if isinstance(asked, Compensator) else asked
 
     @property

@@ -9,6 +9,7 @@ import pandas as pd
 
 from design.anti_windup.compensator import AntiWindup, uncertainty_cost
 from design.anti_windup.other_anti_windups import OTHERS
+from design.blocks.block import plant_block
 from design.design_file import Design
 from experiments.engine.simulate import Run, simulate
 from experiments.physical_limits.least_peak_error import RestLimit
@@ -19,6 +20,7 @@ from experiments.runs.guarantee import guarantee, sector_text
 from experiments.runs.metrics import settling_time
 from experiments.runs.references import Reference
 from identification.base.errors import InputError
+from identification.model.plant import PlantModel
 
 MULTIPLE = 1.2  # of the control that the reference needs: the limit unless given
 PERIODS = 4  # for each upset
@@ -31,7 +33,11 @@ Tick = Callable[[], object]
 
 
 def comparison_tables(
-    design: Design, reference: Reference, limit: float | None = None, tick: Tick = lambda: None
+    design: Design,
+    reference: Reference,
+    limit: float | None = None,
+    tick: Tick = lambda: None,
+    plant: PlantModel | None = None,
 ) -> dict[str, pd.DataFrame]:
     """Run a design without and with each anti-windup that there is for it, from rest and through a disturbance.
 
@@ -45,6 +51,8 @@ def comparison_tables(
         Of the actuator, +-limit; unless given, 1.2 times the most that the control of perfect tracking reaches.
     tick
         Called after every run.
+    plant
+        The true plant; the design's own model unless given.
 
     Returns
     -------
@@ -78,29 +86,31 @@ def comparison_tables(
     InputError
         The limit is not positive, or perfect tracking needs no control or one without bound.
     """
-    plant = design.loop_plant
-    required = reference.required(plant).value
+    true = design.loop_plant if plant is None else plant
+    required = reference.required(true).value
+    if limit is None and not 0 < required < np.inf:
+        raise InputError(f"the control that the reference needs reaches {required:g}, from which no limit follows")
     limit = MULTIPLE * required if limit is None else limit
     if not 0 < limit < np.inf:
         raise InputError(f"the limit is {limit:g}; expected a positive finite number")
-    period = span(design, reference)
+    period = _period(design, reference)
     time_s = np.linspace(0.0, 2 * PERIODS * period, 2 * PERIODS * SAMPLES + 1)
     begin = PERIODS * period
     disturbances = Disturbances(input=steps([(limit, begin), (0.0, begin + PULSE * period)]))
 
     kinds, refused = anti_windups(design)
-    loops = {name: design_loop(design, reference, kind, None, disturbances) for name, kind in kinds.items()}
+    loops = {name: design_loop(design, reference, kind, true, disturbances) for name, kind in kinds.items()}
     unsaturated = simulate(loops["none"], (-np.inf, np.inf), time_s).outputs["output"]
     runs: dict[str, Run] = {}
     for name, loop in loops.items():
         runs |= run_all({name: loop}, limit, time_s)
         tick()
-    from_s, least = _least_error(design, reference, limit, period)
+    from_s, least = _least_error(true, reference, limit, period)
     rows = []
     for name in ("none", *design.anti_windup, *OTHERS):
         known: dict[str, object] = {"limit": limit, "required": required, "refused": refused.get(name)}
         if name in kinds:
-            known |= _promised(design, kinds[name])
+            known |= _promised(design, kinds[name], true)
         for upset, start_s in (("start", 0.0), ("pulse", begin)):
             row: dict[str, object] = {"run": name, "upset": upset} | known
             if name in runs:
@@ -125,18 +135,26 @@ def anti_windups(design: Design) -> tuple[dict[str, AntiWindup | None], dict[str
     return found, refused
 
 
-def _promised(design: Design, kind: AntiWindup | None) -> dict[str, object]:
-    sector = guarantee(design, kind).sector
+def _period(design: Design, reference: Reference) -> float:
+    """The reference's period in seconds; of a constant, long enough for the loop and for the plant's own modes."""
+    if np.isfinite(reference.period_s):
+        return reference.period_s
+    rates = [-pole.real for pole in plant_block(design.loop_plant).poles if pole.real < 0]
+    return max(span(design, reference), float(np.log(1 / SETTLED)) / min(rates, default=np.inf))
+
+
+def _promised(design: Design, kind: AntiWindup | None, plant: PlantModel) -> dict[str, object]:
+    sector = guarantee(design, kind, plant).sector
     said = "none" if sector == 0 else "global" if sector >= 1 else f"sector {sector_text(sector)}"
     if kind is None or not kind.theta1_tilde.is_stable:
         return {"guarantee": said, "f": np.nan}
     return {"guarantee": said, "f": uncertainty_cost(design.additive_bound, kind.one_plus)[0]}
 
 
-def _least_error(design: Design, reference: Reference, limit: float, period: float) -> tuple[float, float]:
+def _least_error(plant: PlantModel, reference: Reference, limit: float, period: float) -> tuple[float, float]:
     """From when on errors count, in seconds, and how small the greatest can be at best; NaN where it is not known."""
     try:
-        rest = RestLimit(design.loop_plant, reference, limit, STEPS)
+        rest = RestLimit(plant, reference, limit, STEPS)
         index = round(rest.last / (4 * 2))
         return rest.start_s(index), rest.at(index).lower
     except InputError:

@@ -1,8 +1,8 @@
 """The anti-windups of least L2 gain from v, the control of the loop without saturation, to y_d, by linear matrix
 inequalities.
 
-With u = v - c x, y_d = c_d x and x' = A x + b u~, u~ = u - sat(u) meets u~ (k u - u~) >= 0 as long as the dead zone is
-in the sector k: of every u for k = 1, of |u| <= L/(1 - k) below. V = x'Q^-1 x proves the gain gamma if
+With u = v - c x, y_d = c_d x + d u~ and x' = A x + b u~, u~ = u - sat(u) meets u~ (k u - u~) >= 0 as long as the dead
+zone is in the sector k: of every u for k = 1, of |u| <= L/(1 - k) below. V = x'Q^-1 x proves the gain gamma if
 
     dV/dt + y_d^2/gamma - gamma v^2 + (2/U) u~ (k (v - c x) - u~) < 0   for all (x, u~, v) but 0,
 
@@ -79,13 +79,14 @@ def weston_postlethwaite(plant: PlantModel, bandwidth: float) -> LeastGain:
     import cvxpy as cp
 
     unit = geometric_scale(block)
-    A, b, c = _in_unit(realize(block), unit)
+    system = realize(block)
+    A, b, c = _in_unit(system, unit)
     Q, L, U = cp.Variable((len(b), len(b)), symmetric=True), cp.Variable((1, len(b))), cp.Variable((1, 1))
     moved = A @ Q + b @ L
     radius = max(bandwidth, *map(abs, block.poles)) / unit
     disk = cp.bmat([[radius * Q, moved], [moved.T, radius * Q]]) >> 0
     k = _sector(block)
-    gain = _solve(Q, U, moved, b @ U, -L, c @ Q, k, [disk])
+    gain = _solve(Q, U, moved, b @ U, -L, c @ Q + system.d[0] * L, system.d[0] * U, k, [disk])
     F = np.linalg.solve(Q.value, L.value.T).T
     return LeastGain(from_one_plus(Block(1.0, block.poles, _eigenvalues(A + b @ F, unit))), gain, k)
 
@@ -124,13 +125,14 @@ def static(plant: PlantModel, g: Block, poles: Sequence[complex]) -> LeastGain:
     unit = geometric_scale(block, g, own)
     A, b, _ = _in_unit(realize(own), unit)
     A_f, c_f = A.T, b.T  # every f gives another numerator
-    A_g, b_g, c_g = _in_unit(realize(g, block * g), unit)
+    rest = realize(g, block * g)
+    A_g, b_g, c_g = _in_unit(rest, unit)
     n, m = len(A_f), len(A_g)
     full = np.block([[A_f, np.zeros((n, m))], [-b_g @ c_f, A_g]])
     Q, X, U = cp.Variable((n + m, n + m), symmetric=True), cp.Variable((n, 1)), cp.Variable((1, 1))
-    theta1_tilde, y_d = np.hstack([-c_f, c_g[:1]]), np.hstack([np.zeros((1, n)), c_g[1:]])
+    theta1_tilde, y_d = np.hstack([-c_f, c_g[:1]]), np.hstack([-rest.d[1] * c_f, c_g[1:]])
     k = _sector(block)
-    gain = _solve(Q, U, full @ Q, cp.vstack([X, b_g @ U]), -theta1_tilde @ Q, y_d @ Q, k, [])
+    gain = _solve(Q, U, full @ Q, cp.vstack([X, b_g @ U]), -theta1_tilde @ Q, y_d @ Q, rest.d[1] * U, k, [])
     zeros = _eigenvalues(A_f + X.value @ c_f / U.value, unit)
     return LeastGain(from_one_plus(g * Block(1.0, zeros, tuple(poles))), gain, k)
 
@@ -149,7 +151,15 @@ def _eigenvalues(A: Real, unit: float) -> tuple[complex, ...]:
 
 
 def _solve(
-    Q: Shaped, U: Shaped, AQ: Shaped, bU: Shaped, minus_cQ: Shaped, y_dQ: Shaped, k: float, more: list[Shaped]
+    Q: Shaped,
+    U: Shaped,
+    AQ: Shaped,
+    bU: Shaped,
+    minus_cQ: Shaped,
+    y_dQ: Shaped,
+    y_dU: Shaped,
+    k: float,
+    more: list[Shaped],
 ) -> float:
     """Give Q and U their values, and return the gain.
 
@@ -164,9 +174,9 @@ def _solve(
     inequality = cp.bmat(
         [
             [AQ + AQ.T, bU + k * minus_cQ.T, none, y_dQ.T],
-            [bU.T + k * minus_cQ, -2 * U, k * one, 0 * one],
+            [bU.T + k * minus_cQ, -2 * U, k * one, y_dU],
             [none.T, k * one, -gain, 0 * one],
-            [y_dQ, 0 * one, 0 * one, -gain],
+            [y_dQ, y_dU, 0 * one, -gain],
         ]
     )
     problem = cp.Problem(cp.Minimize(gain[0, 0]), [inequality << 0, Q >> 0, *more])
@@ -177,7 +187,8 @@ def _solve(
         raise InputError(f"the linear matrix inequality has no solution for the sector {k:g} ({problem.status})")
     found = float(gain.value[0, 0])
     gain.value = (1 + SPARE) * gain.value
-    size = np.sqrt(np.abs(np.diag(inequality.value)))
+    sizes = np.concatenate([np.diag(Q.value), U.value.ravel(), gain.value.ravel(), gain.value.ravel()])
+    size = np.sqrt(np.maximum(sizes, np.finfo(float).tiny))
     eigenvalues = np.linalg.eigvalsh(inequality.value / np.outer(size, size))
     if not (eigenvalues[-1] <= ROUNDING * -eigenvalues[0] and np.linalg.eigvalsh(Q.value)[0] > 0):
         raise InputError(f"the linear matrix inequality is not solved to rounding for the sector {k:g}")

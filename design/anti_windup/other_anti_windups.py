@@ -110,8 +110,9 @@ def internal_model(loop: LinearLoop) -> AntiWindup:
         The plant has a pole with Re s >= 0, which theta2 = P would have too.
     """
     if poles := plant_block(loop.plant).unstable_poles:
-        at = f"{poles[0]:.4g} rad/s" if poles[0] else "s = 0"
-        raise InputError(f"the plant has a pole at {at}; the internal model expects a stable plant")
+        pole = max(poles, key=lambda each: each.real)
+        at = f"{pole.real:.4g}" + (f" +- {abs(pole.imag):.4g}j" if pole.imag else "")
+        raise InputError(f"the plant has a pole at {at} rad/s; the internal model expects a stable plant")
     return AntiWindup(Block(0.0), Block(1.0))
 
 

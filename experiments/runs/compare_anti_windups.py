@@ -48,14 +48,13 @@ def run_all(loops: Mapping[str, SaturatedLoop], limit: float | Sequence[float], 
 
 
 def _run(loop: SaturatedLoop, limit: float | Sequence[float], time_s: np.ndarray) -> Run:
-    limits = limit_pair(limit)
     try:
-        return simulate(loop, limits, time_s)
+        return simulate(loop, limit_pair(limit), time_s)
     except DivergenceError as error:
-        before = time_s[time_s < error.time_s]
+        before = time_s[time_s < min(error.time_s, time_s[-1])]
         if len(before) < 2:
             raise
-        part = simulate(loop, limits, before)
+        part = _run(loop, limit, before)  # in other steps it may pass the bound a little earlier
         rest = np.full(len(time_s) - len(before), np.nan)
         return replace(
             part,

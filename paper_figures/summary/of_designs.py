@@ -26,6 +26,7 @@ FIGURES = {
     "limits_delay_free": "A.4",
     "limits_extended": "A.4",
     "sampled": "A.5",
+    "compare": "A.8",
     "campaign": "A.6",
     "hidden_modes": "A.9",
 }
@@ -35,7 +36,7 @@ FOLLOWING = {
     "delay_free": ("delay_free", "limits_delay_free"),
     "extended": (
         *("f_gamma", "extended", "trade_off", "interpolation", "limits_extended", "sampled", "campaign"),
-        "hidden_modes",
+        *("hidden_modes", "compare"),
     ),
     "robust": ("robustness",),
 }

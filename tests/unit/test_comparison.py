@@ -17,9 +17,10 @@ from experiments.comparison import comparison_tables
 from experiments.engine.simulate import simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.disturbances import Disturbances, steps
-from experiments.runs.references import sinusoid
+from experiments.runs.references import Reference, sinusoid
 from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
+from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 
 BOUND = AdditiveBound.printed_form(gain=0.01, corner=100.0, omega=300.0, zeta=0.1)
@@ -87,3 +88,21 @@ def test_the_command_writes_both_tables_or_none(late_integrator: Design, tmp_pat
     assert "expected a positive number" in refused.output
     assert CliRunner().invoke(main, words).exit_code == 0
     assert {each.name for each in folder.iterdir()} == {"compare.csv", "compare_runs.csv"}
+
+
+def test_a_run_that_diverges_leaves_the_others_alone() -> None:
+    """Of a plant with a zero at s = 0 conditioning drives an unstable inverse of the controller."""
+    plant = PlantModel(2.0, (), (Mode(14.0, 0.03),), 0.02, -1)
+    table = comparison_tables(design_extended(IdentifiedModel(plant, BOUND), [1.5]), sinusoid(1.0, 1.5))["compare"]
+    pulse = table[table["upset"] == "pulse"].set_index("run")
+    assert np.isnan(pulse["largest_control"]["conditioning"])
+    assert np.isfinite(pulse["recovery_s"]["corrected"])
+
+
+def test_a_constant_reference_leaves_the_plant_time_enough() -> None:
+    plant = PlantModel(2.0, (), (), 0.01, 0, (), (3.0,))
+    design = design_extended(IdentifiedModel(plant, BOUND), [0.0])
+    table = comparison_tables(design, Reference((1.0,), (0.0,), (np.pi / 2,), 0.0))["compare"]
+    start = table[table["upset"] == "start"].set_index("run")
+    # under 1.2 times what it needs the output takes ln(1.2/(1.2 - 1))/3 s at least, to the 1 % that count
+    assert start["recovery_s"]["corrected"] > np.log(1.2 / 0.21) / 3
