@@ -64,15 +64,20 @@ def conditions(omegas: Sequence[float], delay_s: float, a: float) -> Conditions:
             f"omega = {', '.join(f'{omega:g}' for omega in omegas)}, T_d = {delay_s:g}, a = {a:g}; "
             "expected omega >= 0, T_d >= 0 and a > 0"
         )
-    if len(set(omegas)) < len(omegas):
-        raise InputError(
-            f"the reference has the frequencies {', '.join(f'{omega:g}' for omega in omegas)} rad/s; expected each once"
-        )
+    require_each_once(omegas)
     positive = tuple(float(omega) for omega in sorted(omegas) if omega > 0)
     s = 1j * np.array(positive)
     delayed = np.exp(-s * delay_s)
     at_omegas = (s + a - a * delayed) * (s + a) / (s * delayed)
     return Conditions(a, delay_s, positive, a * (1 + a * delay_s), tuple(complex(value) for value in at_omegas))
+
+
+def require_each_once(omegas: Sequence[float]) -> None:
+    """Refuse a reference that has a frequency twice."""
+    if len(set(omegas)) < len(omegas):
+        raise InputError(
+            f"the reference has the frequencies {', '.join(f'{omega:g}' for omega in omegas)} rad/s; expected each once"
+        )
 
 
 @dataclass(frozen=True)

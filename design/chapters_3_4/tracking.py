@@ -12,6 +12,7 @@ from flint import acb, acb_mat, arb, arb_poly
 from design.blocks.ball import decided, number, polynomial_roots
 from design.blocks.block import Block, plant_block
 from design.blocks.inner_outer import inner_outer
+from design.chapters_3_4.interpolate_Q import require_each_once
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
@@ -81,10 +82,7 @@ def tracking_conditions(
             f"the frequencies of the reference are {', '.join(f'{omega:g}' for omega in omegas) or 'none'} rad/s; "
             "expected one or more, none negative"
         )
-    if len(set(omegas)) < len(omegas):
-        raise InputError(
-            f"the reference has the frequencies {', '.join(f'{omega:g}' for omega in omegas)} rad/s; expected each once"
-        )
+    require_each_once(omegas)
     if plant.integrators < 0 and 0 in omegas:
         raise InputError(
             f"the plant has {-plant.integrators} zero(s) at s = 0, so that no bounded control holds a constant "
