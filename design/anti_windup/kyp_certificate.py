@@ -74,7 +74,8 @@ def certificate(M: Block) -> Rows:
     Raises
     ------
     InputError
-        M is not strictly positive real but for a simple zero at s = 0, or a pole is not real.
+        M is not strictly positive real but for a simple zero at s = 0, a pole is not real, or P in double precision
+        does not prove it, see :func:`proved_storage`.
 
     Notes
     -----
@@ -101,7 +102,9 @@ def certificate(M: Block) -> Rows:
     row = _floats(_along_chain([Fraction(value) for value in g[::-1]], rates)[1])
     A = _floats(_chain(rates)[0])
     P = solve_continuous_lyapunov(A.T, -row.T @ row - float(slack) * np.eye(n)) if n else np.zeros((0, 0))
-    return tuple(tuple(each) for each in ((P + P.T) / 2).tolist())
+    rows = tuple(tuple(each) for each in ((P + P.T) / 2).tolist())
+    proved_storage(M, rows)
+    return rows
 
 
 def proved_storage(M: Block, rows: Rows) -> Storage:

@@ -149,6 +149,32 @@ def test_the_certificate_dissipates(M: Block) -> None:
     assert np.all(storage.value(x) >= 0)
 
 
+def test_poles_far_apart_have_a_certificate() -> None:
+    """Of any positive real M with one slow pole and fast ones, or with all of them drawn, over five decades."""
+    rng = np.random.default_rng(1)
+    proved = 0
+    while proved < 40:
+        n = int(rng.integers(2, 7))
+        rates = np.sort(10 ** np.append([-1.0, 4.0], rng.uniform(-1, 4, n - 2)))
+        if rng.random() < 0.5:
+            rates[1:] = rates[-1]
+        pair = rates[-1] * 10 ** rng.uniform(-1, 0.3) * np.exp(1j * rng.uniform(1.6, 3.1))
+        zeros = [0, *(-rates[1:] * 10 ** rng.uniform(-1, 0.3, n - 1))]
+        if n > 2 and rng.random() < 0.7:
+            zeros[-2:] = [pair, pair.conjugate()]
+        M = Block(1.0, tuple(map(complex, zeros)), tuple(map(complex, -rates)))
+        if is_positive_real(M):
+            storage, proved = proved_storage(M, certificate(M)), proved + 1
+            dissipated = storage.A.T @ storage.P + storage.P @ storage.A
+            assert np.linalg.eigvalsh(dissipated).max() < 0
+
+
+def test_a_certificate_that_rounding_spoils_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("design.anti_windup.kyp_certificate.solve_continuous_lyapunov", lambda *_: -np.eye(1) / 3)
+    with pytest.raises(InputError, match="the certificate of the anti-windup does not"):
+        certificate(WASHOUT)
+
+
 def test_the_certificate_of_a_washout_is_the_only_one() -> None:
     storage = proved_storage(WASHOUT, certificate(WASHOUT))
     assert pytest.approx(1 / 3, rel=1e-15) == storage.P
