@@ -123,7 +123,8 @@ def run_chunk(campaign: Campaign, first: int, last: int) -> Columns:
         covered
             Whether the guarantee covers the run, see :mod:`experiments.runs.sector_promise`.
         largest_control, needed_sector
-            The largest |u|, and the sector that the run needs; None where nothing is guaranteed.
+            The largest |u|, and the sector that the run needs, infinite where the reference takes a control that
+            reaches a limit; None where nothing is guaranteed.
         gain, delay_s, zero_omega_1, zero_zeta_1, ..., real_zero_1, ...
             The true plant.
 

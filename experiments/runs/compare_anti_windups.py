@@ -16,7 +16,8 @@ from experiments.runs.design_loop import design_loop
 from experiments.runs.guarantee import guarantee
 from experiments.runs.metrics import last_saturation, over_last, settling_time
 from experiments.runs.references import Reference
-from experiments.runs.sector_promise import Verdict, judge_run
+from experiments.runs.sector_promise import judge_run
+from experiments.runs.verdict import Verdict
 
 SETTLED = 0.01  # band of the settling time, as a share of the reference's amplitude
 
@@ -126,9 +127,9 @@ def tracking_summary(
         peak_error_after_1s (from one second on, as chapter 4 reads its plot; empty: the run is shorter),
         relative_error_percent (largest error of the last period over the reference's amplitude). A run that diverges
         has empty cells. Then, of :mod:`experiments.runs.sector_promise`, guaranteed_sector (0: nothing is guaranteed),
-        needed_sector, largest_control (the largest |u|) and covered_control (how large it may be wherever v_s is; empty
-        too where nothing is guaranteed, or any size is covered), empty for a run without anti-windup, by Pade's
-        approximation or that diverges; and covered (0 or 1).
+        needed_sector (infinite where v_s reaches a limit), largest_control (the largest |u|) and covered_control (how
+        large it may be wherever v_s is; empty too where nothing is guaranteed, or any size is covered), empty for a run
+        without anti-windup, by Pade's approximation or that diverges; and covered (0 or 1).
     """
     rows = []
     for name, run in runs.items():

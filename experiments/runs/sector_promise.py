@@ -15,120 +15,35 @@ is the sector that the run needs. Let its largest value be k, and k_c the sector
     the norm of u_tilde <= the norm of v - v_s, divided by 1/k - 1/k_c                        (norms: L_2 from 0 on).
 
 So u returns to v, and with a stable theta2 the output to that of the linear loop. Nothing is promised of a run that
-needs more, and nothing where v_s itself reaches the limits. k and k_c are found, at times and frequencies that are
-refined around their extremes; no bound is put on what lies between. A multiplier m > 0 in Popov's condition is for a
-dead zone that does not vary with time: it promises nothing under a reference. With another true plant v and v_s are
+needs more, and nothing where v_s itself reaches a limit: it needs an infinite one. k and k_c are found, at times and
+frequencies that are refined around their extremes; no bound is put on what lies between. A multiplier m > 0 in Popov's
+condition is for a dead zone that does not vary with time: it promises nothing under a reference. With another true plant v and v_s are
 those of its own linear loop, and theta1~ is what :func:`design.anti_windup.popov.robust_loss` makes of it.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import Run, simulate
-from experiments.runs.guarantee import Guarantee, sector_text
+from experiments.runs.guarantee import Guarantee
 from experiments.runs.references import Reference, SampledReference
 from experiments.runs.steady_control import response, steady_constant
-from experiments.runs.windup_bound import Windup, windup_of_run
-from identification.base.digits import told_apart
+from experiments.runs.verdict import Verdict, covers
+from experiments.runs.windup_bound import windup_of_run
 from identification.model.plant import PlantModel
 
 A_EXCURSION = 64  # samples of u between two crossings of the limits, at least
 A_TIME_CONSTANT = 10  # samples of u beyond the limits in the loop's shortest time constant
 REFINEMENTS = 8  # of the samples around the largest u and secant, and around where the guarantee is left
 A_REFINEMENT = 33  # samples of each, in place of three
-CONVERGED = 1e-12
 A_PERIOD = 200  # samples of v_s in a period of the reference
 MOST_SAMPLES = 1e6
 EVENLY = 50_001  # samples of v for the bound on the windup
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """What a run needs, beside what is guaranteed.
-
-    Parameters
-    ----------
-    guarantee
-        Of the run's design and anti-windup.
-    largest_control, largest_control_at_s
-        U, the largest |u|, and when; of a run that never saturates, among its own times.
-    largest_steady
-        V, the most that |v_s| reaches.
-    limit
-        L, the nearer of the limits.
-    needed_sector, needed_at_s
-        The largest secant from v_s, and when; 0 for a run that never saturates, 1 where v_s reaches a limit.
-    left_at_s
-        When the run first needed more than is guaranteed; NaN: never.
-    windup
-        What a guarantee whatever the control says of the run; None for another one, and where nothing is promised.
-    """
-
-    guarantee: Guarantee
-    largest_control: float
-    largest_control_at_s: float
-    largest_steady: float
-    limit: float
-    needed_sector: float
-    needed_at_s: float
-    left_at_s: float
-    windup: Windup | None = None
-
-    @property
-    def covered(self) -> bool:
-        """Whether the guarantee speaks of the run, whose reference is then within the limits."""
-        return self.needed_sector < min(self.guarantee.sector, 1.0)
-
-    @property
-    def covered_control(self) -> float:
-        """The most that |u| may reach wherever v_s is: U in (U - L)/(U - V) = k_c."""
-        k = self.guarantee.sector
-        if self.largest_steady >= self.limit:
-            return self.limit
-        return math.inf if k >= 1 else (self.limit - k * self.largest_steady) / (1 - k)
-
-    def agrees(self, other: Verdict) -> bool:
-        """Whether both have the same largest |u| and needed sector, to rounding."""
-        own, others = (np.array([each.largest_control, each.needed_sector]) for each in (self, other))
-        return bool(np.all(np.abs(own - others) <= CONVERGED * np.abs(own)))
-
-    @property
-    def needs(self) -> str:
-        """What the run needs beside what is guaranteed and covered."""
-        needed, guaranteed = told_apart(self.needed_sector, self.guarantee.sector, 3, sector_text)
-        reached, most = told_apart(self.largest_control, self.covered_control, 3, _plain)
-        covered = f"up to {most}" if math.isfinite(self.covered_control) else "any size"
-        return (
-            f"the run needs the sector {needed} at t = {self.needed_at_s:.3g} s, {guaranteed} is guaranteed (|u| "
-            f"reached {reached}; {covered} is covered)"
-        )
-
-    def __str__(self) -> str:
-        """In words; empty for a run that never saturates, of which nothing need be promised."""
-        if self.needed_sector == 0:
-            return ""
-        if self.guarantee.missing:
-            return f"No guarantee: {self.guarantee.missing}; |u| reached {self.largest_control:.3g}"
-        if self.windup is not None:
-            return f"Guaranteed whatever the control: {self.windup} (|u| reached {self.largest_control:.3g})"
-        if self.covered:
-            return f"Covered by its guarantee: {self.needs}"
-        if self.largest_steady >= self.limit:
-            steady, limit = told_apart(self.largest_steady, self.limit, 4, _plain)
-            return (
-                f"NOT covered by its guarantee: the reference takes a control of {steady}, beyond the limit {limit}; "
-                f"|u| reached {self.largest_control:.3g}"
-            )
-        return f"NOT covered by its guarantee, which it left at t = {self.left_at_s:.3g} s: {self.needs}"
-
-
-def _plain(value: float, digits: int) -> str:
-    return f"{value:.{digits}g}"
 
 
 def steady_control(reference: Reference | SampledReference, plant: PlantModel, time_s: np.ndarray) -> np.ndarray:
@@ -159,7 +74,7 @@ def steady_control(reference: Reference | SampledReference, plant: PlantModel, t
 
 
 def needed_sector(control: np.ndarray, steady: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
-    """The secant (u - sat(u))/(u - v_s) of the dead zone, sample by sample; 1 where v_s is not within the limits.
+    """The secant (u - sat(u))/(u - v_s) of the dead zone, sample by sample.
 
     Parameters
     ----------
@@ -171,13 +86,13 @@ def needed_sector(control: np.ndarray, steady: np.ndarray, limits: tuple[float, 
     Returns
     -------
     ndarray, shape (s,)
-        From 0 to 1.
+        From 0 to 1; infinite where v_s is not within the limits, since no sector promises anything there.
     """
     low, high = limits
     beyond = control - np.clip(control, low, high)
     away = np.where(beyond == 0, 1.0, control - steady)
     inside = (low < steady) & (steady < high)
-    return np.where(inside, beyond / np.where(inside, away, 1.0), 1.0)
+    return np.where(inside, beyond / np.where(inside, away, 1.0), np.inf)
 
 
 def verdict(
@@ -199,13 +114,13 @@ def verdict(
     never = bool(np.all((low <= control) & (control <= high)))
     needed = np.zeros(len(time_s)) if never else needed_sector(control, steady, limits)
     at, largest = int(np.argmax(needed)), int(np.argmax(np.abs(control)))
-    left = np.flatnonzero(needed >= min(given.sector, 1.0))
+    left = np.flatnonzero(~covers(given.sector, needed))
     return Verdict(
         guarantee=given,
-        largest_control=float(abs(control[largest])),
-        largest_control_at_s=float(time_s[largest]),
-        largest_steady=float(np.abs(steady).max()),
-        limit=min(-low, high),
+        farthest_control=float(control[largest]),
+        farthest_control_at_s=float(time_s[largest]),
+        steady=(float(steady.min()), float(steady.max())),
+        limits=limits,
         needed_sector=float(needed[at]),
         needed_at_s=float(time_s[at]),
         left_at_s=float(time_s[left[0]]) if len(left) else math.nan,
@@ -245,10 +160,10 @@ def judge_run(
         before, found = found, verdict(given, time_s, control, steady_control(reference, plant, time_s), limits)
         if found.agrees(before):
             break
-        at = np.searchsorted(time_s, [found.largest_control_at_s, found.needed_at_s, found.left_at_s])
+        at = np.searchsorted(time_s, [found.farthest_control_at_s, found.needed_at_s, found.left_at_s])
         around = time_s[np.clip(np.add.outer([-1, 1], at), 0, len(time_s) - 1)]
         more = np.unique(np.linspace(around[0], around[1], A_REFINEMENT))
-    if given.sector < 1 or found.needed_sector == 1:
+    if given.sector < 1 or math.isinf(found.needed_sector):
         return found
     end = float(run.time_s[-1])
     evenly = np.linspace(0.0, end, EVENLY)

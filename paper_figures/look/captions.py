@@ -130,7 +130,7 @@ def promised(summary: pd.DataFrame, run: str) -> str:
         return "never saturates and needs no guarantee"
     if guaranteed == 0:
         return "has no guarantee, since theta2 is not stable"
-    if of_run(summary, run, "required") >= of_run(summary, run, "limit"):
+    if math.isinf(needed):
         return "is NOT covered by its guarantee, since the reference takes more than the limits give"
     sector, k = told_apart(needed, guaranteed, 3, sector_text)
     reached, most = told_apart(largest_control, covered_control, 3, number)

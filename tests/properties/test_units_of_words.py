@@ -12,7 +12,7 @@ from other_units import Units
 
 from design.design_file import Design
 from experiments.runs.guarantee import Guarantee, sector_text
-from experiments.runs.sector_promise import Verdict
+from experiments.runs.verdict import Verdict
 from experiments.thesis.studies import hidden_modes, interpolation
 from experiments.thesis.studies.chapter_2 import delay_free_tables
 from experiments.thesis.studies.chapter_4 import extended_tables
@@ -72,11 +72,11 @@ def test_numbers_that_differ_are_told_apart() -> None:
 def test_a_verdict_tells_what_is_needed_from_what_is_guaranteed() -> None:
     """ "needs the sector 0.95, 0.95 is guaranteed" and "takes a control of 10, beyond the limit 10" are riddles."""
     given = Guarantee(0.9501)
-    near = Verdict(given, 220.4, 1.0, 5.0, 12.0, 0.9502, 1.0, 1.0)
+    near = Verdict(given, 220.4, 1.0, (-5.0, 5.0), (-12.0, 12.0), 0.9502, 1.0, 1.0)
     assert "needs the sector 0.9502 at t = 1 s, 0.9501 is guaranteed" in str(near)
-    beyond = Verdict(given, 220.4, 1.0, 10.00001, 10.0, 1.0, 1.0, 1.0)
+    beyond = Verdict(given, 220.4, 1.0, (-10.00001, 10.00001), (-10.0, 10.0), np.inf, 1.0, 1.0)
     assert "a control of 10.00001, beyond the limit 10;" in str(beyond)
-    anything = Verdict(Guarantee(1.0), 220.4, 1.0, 5.0, 12.0, 0.9, 1.0, np.nan)
+    anything = Verdict(Guarantee(1.0), 220.4, 1.0, (-5.0, 5.0), (-12.0, 12.0), 0.9, 1.0, np.nan)
     assert "any size is covered" in str(anything)
 
 

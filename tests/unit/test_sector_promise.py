@@ -24,7 +24,8 @@ from experiments.runs.compare_anti_windups import loops, run_all, tracking_summa
 from experiments.runs.design_loop import design_loop
 from experiments.runs.guarantee import Guarantee, guarantee, guarantee_within, sector_text
 from experiments.runs.references import Reference, SampledReference, sinusoid
-from experiments.runs.sector_promise import Verdict, judge_run, needed_sector, steady_control, verdict
+from experiments.runs.sector_promise import judge_run, needed_sector, steady_control, verdict
+from experiments.runs.verdict import Verdict
 from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies.chapter_2 import delay_free_tables
 from experiments.thesis.studies.chapter_4 import extended_tables
@@ -124,7 +125,7 @@ def test_the_largest_secant_is_found_whatever_the_rows(extended_design: Design, 
     for found in (few, many):
         assert secant * (1 - 1e-12) <= found.needed_sector <= secant * (1 + 1e-4)
         assert control * (1 - 1e-12) <= found.largest_control <= control * (1 + 1e-4)
-        assert found.limit == min(-limits[0], limits[1])
+        assert found.limits == limits
         assert found.covered == (secant < found.guarantee.sector)
 
 
@@ -133,7 +134,7 @@ def test_the_line_of_the_readme(extended_design: Design) -> None:
     found = judged(extended_design, (-12.0, 12.0), CHAPTER_4, 30.0)
     assert not found.covered
     assert found.largest_control == pytest.approx(569.3, abs=0.1)
-    assert found.largest_steady == pytest.approx(AMPLITUDE, rel=1e-3)
+    assert found.steady == pytest.approx((-AMPLITUDE, AMPLITUDE), rel=1e-3)
     k = extended_design.corrected.judgement.popov_sector
     assert found.guarantee.sector == pytest.approx(k, abs=1e-4)
     assert found.covered_control == pytest.approx((12 - k * AMPLITUDE) / (1 - k), rel=3e-3)
@@ -162,7 +163,7 @@ def test_a_sampled_reference_ends_as_a_constant(extended_design: Design) -> None
     assert np.abs(run.control[time_s > 29]).max() < 1e-6
     assert not steady_control(reference, extended_design.plant, time_s).any()
     found = judged(extended_design, (-5.0, 5.0), reference, 30.0)
-    assert found.largest_steady == 0
+    assert found.steady == (0, 0)
     assert found.needed_sector == pytest.approx(1 - 5 / found.largest_control, rel=1e-9)
     assert found.covered_control == pytest.approx(5 / (1 - found.guarantee.sector))
 
@@ -251,8 +252,9 @@ def test_nothing_is_promised_where_the_reference_needs_more_than_the_limits(exte
     for limits in ((-10.0, 10.0), (-10.0, 80.0), (-80.0, 10.0)):
         found = judged(extended_design, limits, CHAPTER_4, 10.0)
         assert not found.covered
-        assert found.needed_sector == 1
-        assert f"the reference takes a control of {found.largest_steady:.4g}, beyond the limit 10;" in str(found)
+        assert found.needed_sector == np.inf
+        sign = "" if limits[1] == 10 else "-"
+        assert f"the reference takes a control of {sign}10.56, beyond the limit {sign}10;" in str(found)
 
 
 def test_a_ramp_within_unequal_limits(extended_design: Design) -> None:
@@ -358,6 +360,40 @@ def test_another_true_plant_has_no_guarantee_here(extended_design: Design, tmp_p
     assert said("simulate", extended_design, tmp_path, *options, "implied").startswith("NOT covered by its guarantee")
 
 
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [
+        ((-0.1, 5.0), "takes a control of -0.3293, beyond the limit -0.1; |u| reached 1"),
+        ((0.1, 2.0), "takes a control of -0.3293, beyond the limit 0.1; |u| reached 1"),
+        ((-2.0, 0.3293), "takes a control of 0.3293, the limit itself; |u| reached 1"),
+    ],
+)
+def test_a_limit_is_named_with_its_sign(limits: tuple[float, float], said: str) -> None:
+    steady, control = np.array([0.3293, -0.3293, 0.1]), np.array([0.5, -1.0, 0.2])
+    assert said in str(verdict(Guarantee(1.02), np.arange(3.0), control, steady, limits))
+
+
+@pytest.mark.parametrize("limits", [(-0.5, 3.0), (0.1, 2.0), (-2.0, -0.1), (-1.0, np.inf)])
+def test_no_control_within_the_covered_ones_leaves_the_guarantee(limits: tuple[float, float]) -> None:
+    """With unequal limits, each with the v_s that is nearest to it."""
+    low, high = max(limits[0], -5.0), min(limits[1], 5.0)
+    steady, k = np.array([low + 0.2 * (high - low), high - 0.3 * (high - low)]), 0.9
+    least, greatest = verdict(Guarantee(k), np.arange(2.0), steady, steady, limits).covered_controls
+    for end in (end for end in (least, greatest) if np.isfinite(end)):
+        needed = max(needed_sector(np.full(2, end), steady, limits))
+        assert needed == pytest.approx(k, rel=1e-12)
+    left = verdict(Guarantee(k), np.arange(2.0), np.array([least - 5, steady[1]]), steady, limits)
+    assert f"(u reached {least - 5:.3g}; from {least:.3g} to {greatest:.3g} is covered)" in str(left)
+
+
+def test_where_a_limit_is_reached_no_sector_is_large_enough() -> None:
+    """A stable plant's is above 1: a reference of 1.05 beyond +-0.5 for ever was covered by it."""
+    time_s, steady = np.arange(3.0), np.array([0.0, 0.3, 1.05])
+    found = verdict(Guarantee(1.02), time_s, np.array([0.0, 0.6, 1.05]), steady, (-0.5, 0.5))
+    assert (found.covered, found.needed_sector, found.left_at_s) == (False, np.inf, 2.0)
+    assert verdict(Guarantee(1.0), time_s[:2], np.array([0.0, 1e20]), steady[:2], (-0.5, 0.5)).covered
+
+
 def test_a_sector_in_words() -> None:
     assert [sector_text(k) for k in (0.95019, 0.9994, 1 - 9.8e-8, 1.0, np.inf)] == [
         "0.95",
@@ -383,7 +419,7 @@ def test_the_summaries_hold_what_is_promised(extended_design: Design, delay_free
         assert not rows.loc[["none", "thesis", "none_pade", "thesis_pade"], "covered"].any()
         assert rows.loc[["none", "none_pade", "thesis_pade"], "guaranteed_sector"].isna().all()
     rows = delay_free_tables(delay_free_design)["delay_free_summary"].set_index("run")
-    assert rows.loc["corrected", "needed_sector"] == 1  # the reference takes 11.05, beyond the limits of 10
+    assert rows.loc["corrected", "needed_sector"] == np.inf  # the reference takes 11.05, beyond the limits of 10
     assert not rows["covered"].any()
 
 

@@ -17,7 +17,8 @@ from experiments.engine.simulate import simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.guarantee import guarantee
 from experiments.runs.references import Reference, sinusoid
-from experiments.runs.sector_promise import Verdict, judge_run, steady_control
+from experiments.runs.sector_promise import judge_run, steady_control
+from experiments.runs.verdict import Verdict
 from experiments.runs.windup_bound import after_run_of_any_plant, before_run, with_states
 from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
@@ -134,7 +135,7 @@ def test_the_engine_keeps_the_bounds(extended_design: Design, limit: float) -> N
     assert windup.bound is not None
     assert windup.stored is not None
     assert windup.was <= windup.stored <= windup.bound.most
-    assert windup.bound.distance <= limit - found.largest_steady
+    assert windup.bound.distance <= limit - max(found.steady)
     kind = extended_design.compensator("corrected")
     time_s = np.linspace(0.0, 12.0, 120001)
     run = simulate(design_loop(extended_design, CHAPTER_4, kind), (-limit, limit), time_s)
