@@ -32,7 +32,7 @@ class Judgement:
     f
         ||W_a (1 + theta1~)||_inf, (2.19), which exceeds it by 1e-9 of it at most: proved.
     f_omega
-        Frequency in rad/s where it is reached.
+        Frequency in rad/s where it is reached; None: as omega grows, of a W_a that does not fall.
     popov_sector
         Sector k that Popov's condition is proved to allow, 1e-9 below the largest found; None: every one.
     popov_multiplier_s
@@ -50,7 +50,7 @@ class Judgement:
     """
 
     f: float
-    f_omega: float
+    f_omega: float | None
     popov_sector: float | None
     popov_multiplier_s: float
     theta1_tilde_at_zero: float
@@ -163,7 +163,7 @@ def judge(plant: PlantModel, bound: AdditiveBound, kind: AntiWindup) -> Judgemen
     slowest = min((-pole.real for pole in kind.one_plus.poles), default=np.inf)
     return Judgement(
         f=f,
-        f_omega=f_omega,
+        f_omega=f_omega if np.isfinite(f_omega) else None,
         popov_sector=sector if np.isfinite(sector) else None,
         popov_multiplier_s=multiplier,
         theta1_tilde_at_zero=float(kind.theta1_tilde(0j).real),

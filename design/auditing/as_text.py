@@ -159,7 +159,8 @@ def _margin_lines(margins: Margins | str | None) -> Iterable[str]:
 
 
 def _margin(margin: Margin) -> str:
-    return f"{margin.value:.4g} (at {margin.omega:.4g} rad/s)"
+    at = "infinity" if margin.omega is None or np.isinf(margin.omega) else f"{margin.omega:.4g} rad/s"
+    return f"{margin.value:.4g} (at {at})"
 
 
 def _end(margin: Margin, unlimited: str, said: Callable[[float], str]) -> str:
@@ -205,7 +206,7 @@ def _anti_windup_rows(found: Audit, windup: float) -> list[Sequence[str]]:
             (
                 name,
                 f"{judged.f:.4g}",
-                f"{judged.f_omega:.4g}",
+                "infinity" if judged.f_omega is None else f"{judged.f_omega:.4g}",
                 "any" if judged.popov_sector is None else lower_end(judged.popov_sector, 4),
                 f"{1 / multiplier:.4g}" if multiplier else "circle",
                 "none" if sector == 0 else ("any" if np.isinf(sector) else f"{sector:.4g}"),

@@ -129,7 +129,7 @@ class Units:
             judgement=replace(
                 judged,
                 f=judged.f * abs(self.gain),
-                f_omega=judged.f_omega / self.time,
+                f_omega=None if judged.f_omega is None else judged.f_omega / self.time,
                 recovery_s=judged.recovery_s * self.time,
             ),
             **{name: getattr(of, name) * factor for name, factor in factors.items() if hasattr(of, name)},

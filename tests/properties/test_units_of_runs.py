@@ -216,7 +216,7 @@ def test_the_commands_say_the_same(small_designs: dict[str, Design], units: Unit
         result = CliRunner().invoke(design_main, [*added, "--output", str(own.with_name("added.json"))])
         assert result.exit_code == 0, result.output
         judged = read_design(own.with_name("added.json")).added["mine"].judgement
-        numbers = [judged.f / abs(each.gain), judged.f_omega * T, judged.popov_sector or 0.0]
+        numbers = [judged.f / abs(each.gain), (judged.f_omega or 0.0) * T, judged.popov_sector or 0.0]
         numbers += [judged.theta1_tilde_at_zero, judged.recovery_s / T, judged.theta2_stable]
         options = ["--limit", repr(1.5 * abs(each.input)), "--until", repr(8 * T), "--amplitude", repr(5 * each.output)]
         options += ["--phase", repr(math.pi / 2)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 from design.anti_windup.compensator import AntiWindup, anti_windup, from_one_plus, second_order, uncertainty_cost
 from design.anti_windup.condition import Sector
 from design.anti_windup.corrected_compensator import Corrected, corrected
-from design.anti_windup.judge import compensators, judge, lasting_offset, robust_sector
+from design.anti_windup.judge import Compensator, compensators, judge, lasting_offset, robust_sector
 from design.anti_windup.popov import popov_sector, robust_popov_sector
 from design.anti_windup.thesis_compensator import least_f, optimal_gamma, thesis_choice
 from design.blocks.block import Block, bound_block, plant_block
@@ -368,3 +370,13 @@ def test_no_multiplier_where_the_uncertainty_does_not_roll_off() -> None:
     circle = -1 / np.min(kind.theta1_tilde(1j * omega).real - 0.2)
     assert constant == pytest.approx(circle, rel=1e-3)
     assert rolling > 5 * constant
+
+
+def test_a_cost_that_is_reached_as_omega_grows_is_kept_in_a_file() -> None:
+    """W_a = 0.02 (1 + s/100)/(1 + s/50) tends to 0.01 as 1 + 3750/omega^2, s/(s + 1000) to 1 as 1 - 500000/omega^2."""
+    kind = from_one_plus(Block(1.0, (0j,), (-1000 + 0j,)))
+    judged = judge(PlantModel(1.0, (), (), 0.1), AdditiveBound(0.02, (), (), (100.0,), (50.0,)), kind)
+    assert judged.f == pytest.approx(0.01, rel=1e-9)
+    assert judged.f_omega is None
+    content = json.loads(json.dumps(Compensator(kind, judged).to_dict(), allow_nan=False))
+    assert Compensator.from_dict(content).judgement == judged
