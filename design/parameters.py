@@ -37,7 +37,7 @@ class DelayFreeParameters:
 
 @dataclass(frozen=True)
 class RollOff:
-    """Of a T_so whose loop is stable around every plant within W_a.
+    """Of a T_so whose loop is stable around every plant within W_a with as many poles in the right half plane.
 
     Parameters
     ----------

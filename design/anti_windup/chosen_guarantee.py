@@ -51,7 +51,11 @@ def chosen_guarantee(
     shown = "found on a refined grid of frequencies, not proved"
     if robustness.rational is not None:
         shown = "proved in exact arithmetic"
-    return guarantee, PositiveReal(robustness), f"for every plant within W_a {ends}; {shown}"
+    return (
+        guarantee,
+        PositiveReal(robustness),
+        f"for every plant within W_a with as many poles in the right half plane {ends}; {shown}",
+    )
 
 
 def why_not_global(unstable: Sequence[complex]) -> str:

@@ -154,7 +154,7 @@ def second_order(alpha: float, beta: float, gamma: float) -> AntiWindup:
 
 
 def uncertainty_cost(bound: AdditiveBound, one_plus: Block) -> tuple[float, float]:
-    """f = ||W_a (1 + theta1~)||_inf of Thesis Eq. (2.19), and the frequency in rad/s where it is reached, infinite of some biproper W_a.
+    """f = ||W_a (1 + theta1~)||_inf of Thesis Eq. (2.19), and where in rad/s it is reached; infinite: as omega grows.
 
     The norm exceeds f by 1e-9 of it at most, which :func:`design.blocks.frequency_peak.block_norm` proves.
     """

@@ -1,4 +1,7 @@
-"""A T_so that keeps the tracking conditions and makes the loop stable for every plant within W_a."""
+"""A T_so that keeps the tracking conditions and makes the loop stable for every plant within W_a.
+
+That is for those with as many poles in the right half plane as the model.
+"""
 
 from __future__ import annotations
 
@@ -98,7 +101,7 @@ def robust_outer_part(
     level: float,
     order: int | None = None,
 ) -> Redesign:
-    """The latest roll-off found of T_so with ||W_a C S|| <= level: the loop around every plant within W_a is stable.
+    """The latest roll-off found of T_so with ||W_a C S|| <= level.
 
     Parameters
     ----------

@@ -21,6 +21,7 @@ from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
 FINE = 200  # frequencies a decade where a true plant is compared with the bound
+OUTSIDE = "the true plant is not within W_a of the design's model, with as many poles in the right half plane"
 TURNED = 1.0  # rad between neighbouring frequencies, beyond which exp(-j omega (h' - h)) may be anything
 
 
@@ -35,7 +36,7 @@ class Guarantee:
     missing
         Why of none, as a sentence without its full stop; else empty.
     any_plant
-        Whether it is one for every plant within W_a.
+        Whether it is one for every plant within W_a with as many poles in the right half plane.
     storage
         Of a positive real 1 + theta1~ with the design's own plant; else None.
     """
@@ -64,12 +65,15 @@ def guarantee(design: Design, anti_windup: Asked, plant: PlantModel | None = Non
         storage = None if certificate is None else proved_storage(kind.one_plus, certificate)
         return _without_criterion(design, kind) or Guarantee(circle_sector(kind.theta1_tilde), storage=storage)
     if not _is_within(design, plant):
-        return Guarantee(0.0, "the true plant is not within W_a of the design's model")
+        return Guarantee(0.0, OUTSIDE)
     return guarantee_within(design, kind)
 
 
 def guarantee_within(design: Design, anti_windup: AntiWindup) -> Guarantee:
-    """What a design promises of runs with every plant within W_a, see :func:`design.anti_windup.popov.robust_loss`."""
+    """What a design promises of runs with every plant within W_a that has as many poles in Re s > 0 as the model.
+
+    See :func:`design.anti_windup.popov.robust_loss`.
+    """
     if missing := _without_criterion(design, anti_windup):
         return missing
     from design.anti_windup.popov import robust_loss  # only here: it takes a third of a second to import
@@ -104,9 +108,14 @@ def _without_criterion(design: Design, anti_windup: AntiWindup) -> Guarantee | N
 
 
 def _is_within(design: Design, true: PlantModel) -> bool:
-    """Whether |P_true - P| <= |W_a| on a fine grid and as omega -> 0 and infinity."""
+    """Whether |P_true - P| <= |W_a| on a fine grid and as omega -> 0 and infinity, with as many poles in Re s > 0.
+
+    |W_a C S| < 1 keeps how often the Nyquist curve turns about -1, so that with another number the loop is not stable.
+    """
     plant, bound = design.loop_plant, design.additive_bound
     blocks = plant_block(plant), plant_block(true), bound_block(bound)
+    if len(blocks[0].unstable_poles) != len(blocks[1].unstable_poles):
+        return False
     if plant.integrators != true.integrators or (plant.integrators and plant.gain != true.gain):
         return False  # the difference has a pole at s = 0
     if min(plant.relative_degree, true.relative_degree) < blocks[2].relative_degree:

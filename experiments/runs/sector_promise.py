@@ -18,7 +18,8 @@ So u returns to v, and with a stable theta2 the output to that of the linear loo
 needs more, and nothing where v_s itself reaches a limit: it needs an infinite one. k and k_c are found, at times and
 frequencies that are refined around their extremes; no bound is put on what lies between. A multiplier m > 0 in Popov's
 condition is for a dead zone that does not vary with time: it promises nothing under a reference. With another true
-plant v and v_s are those of its own linear loop, and theta1~ is what :func:`design.anti_windup.popov.robust_loss` makes of it.
+plant v and v_s are those of its own linear loop, and theta1~ is what
+:func:`design.anti_windup.popov.robust_loss` makes of it.
 """
 
 from __future__ import annotations
