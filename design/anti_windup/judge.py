@@ -112,7 +112,7 @@ class CorrectedCompensator(Compensator):
     Parameters
     ----------
     guarantee, guarantee_said
-        See :func:`design.anti_windup.chosen_guarantee.chosen_guarantee`.
+        See :func:`design.anti_windup.chosen_guarantee.chosen_guarantee`; the sentence is that of the design's command.
     sector
         Of the circle criterion, which it was asked to meet; None for another guarantee.
     bandwidth
@@ -134,7 +134,7 @@ class CorrectedCompensator(Compensator):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         """Read what :meth:`to_dict` writes; raises InputError where its certificate proves nothing.
 
-        What a robust guarantee needs beside it, the margin for W_a, is a matter of the loop and not proved again.
+        What a robust guarantee needs beside it, the margin for W_a, is a matter of the loop, which the audit judges.
         """
         found = super().from_dict(content)
         if found.guarantee not in GUARANTEES:

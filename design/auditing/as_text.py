@@ -61,7 +61,7 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
     without = ", for the plant without its dead time" if found.with_delay is not None else ""
     lines += ["", f"Anti-windup{without}", *_columns(_anti_windup_rows(found, windup))]
     own = design.corrected
-    lines += ["", f"The guarantee of the corrected one is {own.guarantee}: {own.guarantee_said}."]
+    lines += ["", f"The guarantee of the corrected one is {own.guarantee}: {found.guarantee}."]
     alpha, beta, gamma, f = found.least_f
     bandwidth = own.bandwidth
     lines += [

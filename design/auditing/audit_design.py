@@ -8,6 +8,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from design.anti_windup.chosen_guarantee import chosen_guarantee
+from design.anti_windup.condition import Robustness
 from design.anti_windup.judge import Judgement, judge, robust_sector
 from design.anti_windup.thesis_compensator import least_f
 from design.blocks.block import Block, bound_block, fastest_root, geometric_scale, plant_block, plant_numerator
@@ -19,7 +21,7 @@ from design.parameters import ExtendedParameters
 from design.stability.axis import HALVE, NO_ZERO, first_edges, judged_cells
 from design.stability.characteristic_roots import CharacteristicRoots, largest_beyond, rightmost_roots
 from design.stability.jet import jet
-from design.stability.margins import Margins, delay_loop, margins_of, responses, tracking_floor
+from design.stability.margins import Margins, delay_loop, margins_of, robustness_of, tracking_floor
 from identification.base.errors import InputError
 from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
@@ -52,6 +54,8 @@ class Audit:
         What K reaches and the infimum of (2.8), of a delay-free design, or why they were not found; else None.
     anti_windup
         Name -> its judgement.
+    guarantee
+        What the corrected one guarantees, judged again and not read, as a sentence without its full stop.
     robust_sector
         Name -> the largest sector for every plant within W_a; 0 when |W_a C S| reaches 1 or the loop is not stable.
     least_f
@@ -67,6 +71,7 @@ class Audit:
     stabiliser: Synthesis | str | None
     infimum: Infimum | str | None
     anti_windup: dict[str, Judgement]
+    guarantee: str
     robust_sector: dict[str, float]
     least_f: tuple[float, float, float, float]
 
@@ -97,9 +102,7 @@ def audit(design: Design) -> Audit:
     if not isinstance(roots, str):
         shapes += tuple(complex(root) for root in roots.roots)
 
-    def robustness(omega: np.ndarray) -> np.ndarray:
-        return np.asarray(np.abs(bound(1j * omega) * responses(loop, omega)[1]))
-
+    robustness = robustness_of(loop, bound)
     same = None
     chosen = design.parameters
     if isinstance(chosen, ExtendedParameters) and not chosen.inverse_epsilon and "C0" in design.blocks:
@@ -115,7 +118,9 @@ def audit(design: Design) -> Audit:
         interval = _attempt(lambda: infimum(G_A, W1, W2, decay_rate))
     guaranteed = isinstance(margins, Margins) and margins.is_guaranteed
     kinds = {name: each.kind for name, each in design.anti_windup.items()}
-    sectors = {name: robust_sector(kind, robustness, shapes) if guaranteed else 0.0 for name, kind in kinds.items()}
+    sectors = {
+        name: robust_sector(kind, robustness.magnitude, shapes) if guaranteed else 0.0 for name, kind in kinds.items()
+    }
     delayed = None
     if plant != design.plant:
         delayed = _attempt(lambda: margins_of(delay_loop(design, design.plant), bound))
@@ -129,9 +134,25 @@ def audit(design: Design) -> Audit:
         stabiliser=reached,
         infimum=interval,
         anti_windup={name: judge(plant, bound, kind) for name, kind in kinds.items()},
+        guarantee=_guarantee(design, robustness, guaranteed),
         robust_sector=sectors,
         least_f=least_f(bound, design.corrected.bandwidth),
     )
+
+
+def _guarantee(design: Design, robustness: Robustness, is_robust: bool) -> str:
+    """What the corrected theta1~ guarantees, its condition judged for the roots in the file; or why it does not."""
+    own, plant = design.corrected, design.loop_plant
+    try:
+        unstable = plant_block(plant).unstable_poles
+        _, condition, said = chosen_guarantee(unstable, own.guarantee, own.sector, robustness)
+    except InputError as error:
+        return f"NOT met, {error}"
+    if not own.kind.theta2(plant).is_stable:
+        return "NOT met, theta2 is not stable"
+    if own.guarantee == "robust" and not is_robust:
+        return "NOT met, the loops around the plants within W_a are not known to be stable"
+    return said if condition.holds(own.kind) else f"NOT met, of M = 1 + theta1~ {condition} does not hold"
 
 
 def _attempt(compute: Callable[[], Result]) -> Result | str:

@@ -64,6 +64,26 @@ def test_the_redesign_is_guaranteed(implied: IdentifiedModel) -> None:
     assert found.tracking_floor == pytest.approx(0.002329, rel=1e-3)
 
 
+def test_a_guarantee_is_judged_again(extended_design: Design, implied: IdentifiedModel) -> None:
+    """A file says what it likes: robust of a theta1~ for the model alone, by the condition at 10^5 frequencies."""
+
+    def claimed(design: Design) -> Design:
+        own = dataclasses.replace(design.corrected, guarantee="robust", guarantee_said="proved")
+        return dataclasses.replace(design, corrected=own)
+
+    omega = np.geomspace(1e-3, 1e5, 100001)
+    for asked, expected in (("robust", True), ("global", False)):
+        design = design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.4, guarantee=asked)
+        forward, bound = design.controller_parts()[0], design.additive_bound
+        M = design.corrected.kind.one_plus(1j * omega)
+        x = np.abs(forward(1j * omega) * bound(1j * omega))  # C S of a predictor with its own model
+        assert np.all(M.real > np.abs(M) * x / (1 - x)) == expected
+        said = audit(claimed(design)).guarantee
+        assert said.startswith("for every plant within W_a") == said.endswith("proved in exact arithmetic") == expected
+        assert ("does not hold" in said) != expected
+    assert "NOT met, |W_a C S| reaches 8.84" in audit(claimed(extended_design)).guarantee
+
+
 def test_chapter_two_with_and_without_its_dead_time(delay_free_design: Design) -> None:
     found = audit(delay_free_design)
     assert not isinstance(found.margins, str)
