@@ -34,7 +34,8 @@ corrected_options = together(
     click.option(
         "--recovery",
         type=float,
-        help="Corrected anti-windup: most time in s for y_d to fall to 1 %; that of the loop itself unless given.",
+        help="Corrected anti-windup: most time in s for the slowest mode of theta1~ to fall to 1 %; y_d keeps "
+        "the plant's own modes. That of the loop itself unless given.",
     ),
     click.option(
         "--guarantee",

@@ -160,7 +160,6 @@ def judge(plant: PlantModel, bound: AdditiveBound, kind: AntiWindup) -> Judgemen
     """Judge one anti-windup compensator for a plant and its bound."""
     f, f_omega = uncertainty_cost(bound, kind.one_plus)
     sector, multiplier = popov_sector(kind.theta1_tilde)
-    slowest = min((-pole.real for pole in kind.one_plus.poles), default=np.inf)
     return Judgement(
         f=f,
         f_omega=f_omega if np.isfinite(f_omega) else None,
@@ -169,8 +168,14 @@ def judge(plant: PlantModel, bound: AdditiveBound, kind: AntiWindup) -> Judgemen
         theta1_tilde_at_zero=float(kind.theta1_tilde(0j).real),
         theta2_stable=kind.theta2(plant).is_stable,
         lasting_offset=lasting_offset(plant, kind),
-        recovery_s=float(np.log(1 / SETTLED)) / slowest,
+        recovery_s=settling_of_slowest(kind.one_plus),
     )
+
+
+def settling_of_slowest(block: Block) -> float:
+    """Time in seconds in which the slowest mode of a block falls to 1 %; infinite where it is not stable."""
+    slowest = min((-pole.real for pole in block.poles), default=np.inf)
+    return float(np.log(1 / SETTLED)) / slowest if slowest > 0 else np.inf
 
 
 def lasting_offset(plant: PlantModel, kind: AntiWindup) -> float | None:

@@ -60,6 +60,9 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
         lines += ["", "H-infinity stabiliser, ||[W1 S; W2 T]||", *_hinf_lines(found.stabiliser, found.infimum)]
     without = ", for the plant without its dead time" if found.with_delay is not None else ""
     lines += ["", f"Anti-windup{without}", *_columns(_anti_windup_rows(found, windup))]
+    lines.append(
+        "  theta1~ s, theta2 s: time for its slowest mode to fall to 1 %; y_d = theta2 u~ keeps modes of the plant."
+    )
     own = design.corrected
     lines += ["", f"The guarantee of the corrected one is {own.guarantee}: {found.guarantee}."]
     alpha, beta, gamma, f = found.least_f
@@ -199,7 +202,7 @@ def _time(time_s: float, beside_s: float, digits: int = 6) -> str:
 
 def _anti_windup_rows(found: Audit, windup: float) -> list[Sequence[str]]:
     head = ("name", "f", "at rad/s", "Popov sector", "slope 1/s", "for all of W_a", "theta1~(0)", "theta2")
-    rows: list[Sequence[str]] = [(*head, f"offset of {windup:g}", "recovery s")]
+    rows: list[Sequence[str]] = [(*head, f"offset of {windup:g}", "theta1~ s", "theta2 s")]
     for name, judged in found.anti_windup.items():
         multiplier, sector = judged.popov_multiplier_s, found.robust_sector[name]
         rows.append(
@@ -214,6 +217,7 @@ def _anti_windup_rows(found: Audit, windup: float) -> list[Sequence[str]]:
                 "stable" if judged.theta2_stable else "NOT stable",
                 "grows" if judged.lasting_offset is None else f"{judged.lasting_offset * windup:.4g}",
                 f"{judged.recovery_s:.4g}",
+                f"{found.output_recovery_s[name]:.4g}" if judged.theta2_stable else "never",
             )
         )
     return rows

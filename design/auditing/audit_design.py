@@ -10,7 +10,7 @@ import numpy as np
 
 from design.anti_windup.chosen_guarantee import chosen_guarantee
 from design.anti_windup.condition import Robustness
-from design.anti_windup.judge import Judgement, judge, robust_sector
+from design.anti_windup.judge import Judgement, judge, robust_sector, settling_of_slowest
 from design.anti_windup.thesis_compensator import least_f
 from design.blocks.block import Block, bound_block, fastest_root, geometric_scale, plant_block, plant_numerator
 from design.blocks.frequency_peak import frequency_grid
@@ -54,6 +54,8 @@ class Audit:
         What K reaches and the infimum of (2.8), of a delay-free design, or why they were not found; else None.
     anti_windup
         Name -> its judgement.
+    output_recovery_s
+        Name -> time in seconds in which the slowest mode of theta2, and with it y_d after a windup, falls to 1 %.
     guarantee
         What the corrected one guarantees, judged again and not read, as a sentence without its full stop.
     robust_sector
@@ -71,6 +73,7 @@ class Audit:
     stabiliser: Synthesis | str | None
     infimum: Infimum | str | None
     anti_windup: dict[str, Judgement]
+    output_recovery_s: dict[str, float]
     guarantee: str
     robust_sector: dict[str, float]
     least_f: tuple[float, float, float, float]
@@ -134,6 +137,7 @@ def audit(design: Design) -> Audit:
         stabiliser=reached,
         infimum=interval,
         anti_windup={name: judge(plant, bound, kind) for name, kind in kinds.items()},
+        output_recovery_s={name: settling_of_slowest(kind.theta2(plant)) for name, kind in kinds.items()},
         guarantee=_guarantee(design, robustness, guaranteed),
         robust_sector=sectors,
         least_f=least_f(bound, design.corrected.bandwidth),

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy import signal
 
 from design.__main__ import main
+from design.auditing.as_text import audit_text
 from design.auditing.audit_design import audit
 from design.chapter_2.design_delay_free import design_delay_free
 from design.chapters_3_4.design_extended import design_extended
@@ -49,6 +51,8 @@ def test_the_thesis_design(extended_design: Design) -> None:
     assert found.robust_sector == {"thesis": 0.0, "corrected": 0.0}
     assert found.anti_windup["thesis"].lasting_offset == pytest.approx(696.15, abs=0.01)
     assert found.anti_windup["corrected"].lasting_offset == 0.0
+    own = found.anti_windup["corrected"]
+    assert found.output_recovery_s == {"thesis": np.inf, "corrected": pytest.approx(own.recovery_s, rel=1e-12)}
     assert found.least_f[3] == pytest.approx(1.36804, abs=1e-5)
     visible = found.roots.roots[~found.roots.hidden]
     np.testing.assert_allclose(visible[:2], [-1, -1], rtol=1e-6)
@@ -161,6 +165,23 @@ def test_what_is_printed_of_chapter_two(delay_free_design: Design, tmp_path: Pat
         "cancelled",
     ):
         assert part in said
+
+
+def test_what_is_left_of_y_d_decays_with_the_plant_too(implied: IdentifiedModel) -> None:
+    """The slow pole of P is one of theta2 = P M: its step falls like exp(-t/10) though theta1~ has forgotten."""
+    plant = PlantModel(1.0, (), (), 0.1, integrators=0, real_poles=(0.1,))
+    bound = AdditiveBound.printed_form(0.002, 20.0, 60.0, 0.05)
+    design = design_extended(dataclasses.replace(implied, plant=plant, additive_bound=bound), [0.3], 4.0, [(2.0, 1.0)])
+    found = audit(design)
+    fast, slow = found.anti_windup["corrected"].recovery_s, found.output_recovery_s["corrected"]
+    theta2 = design.compensator("corrected").theta2(plant)
+    response = signal.ZerosPolesGain(theta2.zeros, theta2.poles, theta2.gain)
+    time_s = np.array([slow, 2 * slow])
+    left = np.abs(signal.impulse(response, T=np.append(0.0, time_s))[1][1:])
+    assert left[1] / left[0] == pytest.approx(0.01, rel=1e-6)
+    assert fast < slow / 10
+    assert f"{fast:.4g}" in (text := audit_text(design, found, 1.0))
+    assert f"  {slow:.4g}" in text
 
 
 def test_a_theta1_of_ones_own(path: Path, tmp_path: Path) -> None:
