@@ -84,7 +84,7 @@ def simulate_command(
     from experiments.runs.disturbances import UNDISTURBED
     from experiments.runs.guarantee import guarantee
     from experiments.runs.metrics import last_saturation
-    from experiments.runs.region import require_within_region
+    from experiments.runs.region import require_short, require_within_region
     from experiments.runs.sector_promise import judge_run
 
     limits = asked_limits(limit)
@@ -109,6 +109,7 @@ def simulate_command(
     disturbances = disturbances_of(until, input_disturbance, output_disturbance, noise, seed)
     true = None if plant is None else asked_model(plant).plant
     require_within_region(true or content.loop_plant, asked, limits)
+    require_short(true or content.loop_plant, until)
     loop = design_loop(content, asked, kind, true, disturbances)
     with tqdm(total=until, desc="simulate", bar_format=SHARE, disable=None, leave=False) as bar:
         run = simulate(loop, limits, time_s, bar.update, rate_limit)
