@@ -224,7 +224,7 @@ def sampled_command(
         found = verdict(guarantee(content, kind, true), run.time_s, run.control, steady, drive.limits)
         promised = str(found)
         if found.covered:
-            promised = f"Within the guarantee of continuous time, which knows no computer and no drive: {found.needs}"
+            promised = f"No guarantee on a computer; in continuous time the run would be within it: {found.needs}"
     columns = {name: values for name, values in vars(run).items() if values is not None}
     write_tables({output: pd.DataFrame(columns)}, inputs)
     click.echo(_first(promised, f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}"))

@@ -143,7 +143,7 @@ def test_a_reference_beyond_the_region_of_an_unstable_plant_is_refused() -> None
     require_within_region(plant, sinusoid(0.0, 0.5, offset=10.0), (-1.0, 5.1))  # u = 5, whatever the other limit
     with pytest.raises(InputError, match=r"times as far as the limits -1 to 4.9"):
         require_within_region(plant, sinusoid(0.0, 0.5, offset=10.0), (-1.0, 4.9))
-    with pytest.raises(InputError, match=r"the run lasts 26 s .* expected 25 s at most"):
+    with pytest.raises(InputError, match=r"the run lasts 26 s; .* so that 25 s are expected at most"):
         simulate_design(design, 3 * needed, sinusoid(1.0, 0.5), until_s=26.0)
     assert simulate_design(design, 3 * needed, sinusoid(1.0, 0.5), until_s=8.0).time_s[-1] == 8.0
 
