@@ -74,8 +74,8 @@ def require_short(plant: PlantModel, until_s: float) -> None:
     if fastest * until_s > GROWTH:
         raise InputError(
             f"the run lasts {until_s:g} s; the plant has a pole at {fastest:.4g} rad/s in the right half plane, with "
-            f"which the engine's rounding grows like exp({fastest:.4g} t), so that {GROWTH / fastest:.4g} s are expected "
-            "at most, or the sampled controller, which has no such mode"
+            f"which the engine's rounding grows like exp({fastest:.4g} t), so that {GROWTH / fastest:.4g} s are "
+            "expected at most, or the sampled controller, which has no such mode"
         )
 
 
