@@ -51,6 +51,7 @@ COMMANDS = {
         *["--output", "{folder}/c.parquet"],
     ],
     "limits": ["experiments", "limits", "{extended}", "--limit", "12", *REFERENCE, "--output", "{folder}"],
+    "compare": ["experiments", "compare", "{extended}", "--limit", "12", *REFERENCE, "--output", "{folder}"],
     "interpolation": ["experiments", "thesis", "interpolation", "{extended}", "--output", "{folder}"],
     "claims": ["experiments", "thesis", "claims", "--output", "{folder}", "--page", "{folder}/claims.md"],
     "draw": ["paper_figures", "draw", "fig_2_06", "--results", "{folder}", "--output", "{folder}"],
@@ -59,7 +60,16 @@ COMMANDS = {
     "report": ["paper_figures", "report", "implied", *SWEEPS, "--build", "{folder}"],
     "refit": ["antiwindup", "refit", *SWEEPS, "--output", "{folder}/built"],
 }  # fmt: skip
-FILES = {"fit": 2, "limits": 2, "interpolation": 3, "claims": 2, "draw": 4, "bode": 4, "summary": 4}  # others one
+FILES = {
+    "fit": 2,
+    "limits": 2,
+    "compare": 2,
+    "interpolation": 3,
+    "claims": 2,
+    "draw": 4,
+    "bode": 4,
+    "summary": 4,
+}  # others one
 
 KEPT = ("c.parquet.parts/", "built/")  # so that the same command goes on
 UNFINISHED = re.compile(r"\.partial-|\.lock")

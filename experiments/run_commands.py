@@ -84,7 +84,7 @@ def simulate_command(
     from experiments.runs.disturbances import UNDISTURBED
     from experiments.runs.guarantee import guarantee
     from experiments.runs.metrics import last_saturation
-    from experiments.runs.region import require_within_region
+    from experiments.runs.region import require_short, require_within_region
     from experiments.runs.sector_promise import judge_run
 
     limits = asked_limits(limit)
@@ -109,6 +109,7 @@ def simulate_command(
     disturbances = disturbances_of(until, input_disturbance, output_disturbance, noise, seed)
     true = None if plant is None else asked_model(plant).plant
     require_within_region(true or content.loop_plant, asked, limits)
+    require_short(true or content.loop_plant, until)
     loop = design_loop(content, asked, kind, true, disturbances)
     with tqdm(total=until, desc="simulate", bar_format=SHARE, disable=None, leave=False) as bar:
         run = simulate(loop, limits, time_s, bar.update, rate_limit)
@@ -223,7 +224,7 @@ def sampled_command(
         found = verdict(guarantee(content, kind, true), run.time_s, run.control, steady, drive.limits)
         promised = str(found)
         if found.covered:
-            promised = f"Within the guarantee of continuous time, which knows no computer and no drive: {found.needs}"
+            promised = f"No guarantee on a computer; in continuous time the run would be within it: {found.needs}"
     columns = {name: values for name, values in vars(run).items() if values is not None}
     write_tables({output: pd.DataFrame(columns)}, inputs)
     click.echo(_first(promised, f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}"))

@@ -17,6 +17,7 @@ from identification.base.errors import InputError
 from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
 
+CALM = 0.98  # of PEAK on the coarse grid, so that it is met on a fine one
 PEAK = 2.0
 """||S|| that the choice keeps where it can: a modulus margin of 1/2."""
 AHEAD = 10.0  # times the fastest sinusoid of the reference: no faster a loop is chosen
@@ -38,12 +39,15 @@ class ChosenPace:
         In rad/s: every pole of T_so but those of the roll-off has the real part -a.
     order
         Of the roll-off.
+    most
+        What ||S|| is to be at most; infinite where PEAK is not to be had.
     reason
         What holds a down, in words.
     """
 
     a: float
     order: int
+    most: float
     reason: str
 
 
@@ -120,7 +124,7 @@ def chosen_pace(
     options: list[_Option] = []
     for k in range(int(A_DECADE * np.log10(top / bottom)) + 1):
         a = top * 10 ** (-k / A_DECADE)
-        if any(option.sensitivity <= PEAK and option.pace >= a for option in options):
+        if any(option.sensitivity <= CALM * PEAK and option.pace >= a for option in options):
             break  # no slower a has a faster slowest pole
         options += _options(plant, bound, wanted, a, level)
     if not options:
@@ -128,12 +132,12 @@ def chosen_pace(
             f"no closed loop of a pace from {bottom:.3g} to {top:.3g} rad/s has |W_a C S| <= {level:g}; "
             "expected a tighter W_a or another frequency of the reference"
         )
-    calm = [option for option in options if option.sensitivity <= PEAK]
+    calm = [option for option in options if option.sensitivity <= CALM * PEAK]
     best = min(calm or options, key=lambda option: (-option.pace if calm else 0.0, option.sensitivity))
     if not calm:
-        return ChosenPace(best.a, best.order, f"||S|| is least there, {best.sensitivity:.3g}; none is below {PEAK:g}")
-    limited = f"the fastest loop with |W_a C S| <= {level:g} and ||S|| <= {PEAK:g}"
-    return ChosenPace(best.a, best.order, why if best.a == top and best.pace == top else limited)
+        return ChosenPace(best.a, best.order, np.inf, f"||S|| is least there, about {best.sensitivity:.3g}")
+    limited = f"the fastest found with |W_a C S| <= {level:g} and ||S|| <= {PEAK:g}"
+    return ChosenPace(best.a, best.order, PEAK, why if best.a == top and best.pace == top else limited)
 
 
 def _options(
@@ -141,7 +145,8 @@ def _options(
 ) -> list[_Option]:
     """For each order the latest roll-off of a grid that meets the level, norms read on a grid of frequencies."""
     loop = Loop(plant, bound, wanted, fixed_poles(wanted, a, pairs_of(a, wanted.omegas)))
-    omega = frequency_grid(loop.roots, COARSE)[::THIN]
+    fine = frequency_grid(loop.roots, COARSE)
+    omega = fine[::THIN]
     fastest = fastest_root(plant_block(plant), bound_block(bound))
     ends = 10 * max(fastest, a), min((a, *wanted.omegas)) / 10
     rates = np.geomspace(*ends, int(RATES * np.log10(ends[0] / ends[1])) + 2)
@@ -150,7 +155,7 @@ def _options(
         tried = rates if order else rates[:1]
         met = np.flatnonzero(loop.robustness(omega, tried, order).max(axis=1) <= level)
         if len(met):
-            sensitivity = float(loop.sensitivity(omega, tried[met[:1]], order).max())
+            sensitivity = float(loop.sensitivity(fine, tried[met[:1]], order).max())
             pace = min(a, float(tried[met[0]])) if order else a
             found.append(_Option(pace, sensitivity, a, order))
             if pace == a:

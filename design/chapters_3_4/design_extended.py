@@ -151,10 +151,10 @@ def _rolled_off(
     """T_so of any plant, which rolls off as late as W_a allows."""
     plant, bound = model.plant, model.additive_bound
     wanted, reasons = _possible(plant, bound, omegas, level, model.fit.band if model.fit else (0.0, np.inf))
-    order = None
+    order, most = None, np.inf
     if a is None:
         pace = chosen_pace(plant, bound, wanted, level, model.fit.band[1] if model.fit else None)
-        a, order = pace.a, pace.order
+        a, order, most = pace.a, pace.order, pace.most
         reasons.append(f"a = {a:.4g} rad/s: {pace.reason}")
     if pairs is None:
         pairs = pairs_of(a, wanted.omegas)
@@ -162,10 +162,11 @@ def _rolled_off(
             f"e = {e:.4g} rad/s, f = {f:.4g} rad^2/s^2: poles of real part -a, no slower than the sinusoid"
             for e, f in pairs
         ]
-    found = robust_outer_part(plant, bound, wanted, a, fixed_poles(wanted, a, pairs), level, order)
+    found = robust_outer_part(plant, bound, wanted, a, fixed_poles(wanted, a, pairs), level, order, most)
     poles = "one pole" if found.order == 1 else f"{found.order} poles"
+    calm = f" and ||S|| <= {most:g}" if most < np.inf else ""
     reasons.append(
-        f"T_so rolls off with {poles} at {found.rate:.4g} rad/s: the latest found with |W_a C S| <= {level:g}"
+        f"T_so rolls off with {poles} at {found.rate:.4g} rad/s: the latest found with |W_a C S| <= {level:g}{calm}"
         if found.order
         else f"T_so needs no roll-off: |W_a C S| is at most {found.peak:.3g} <= {level:g} as it is"
     )

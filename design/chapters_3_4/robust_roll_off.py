@@ -15,7 +15,7 @@ from design.blocks.frequency_peak import CERTIFIED, block_norm, frequency_grid, 
 from design.blocks.inner_outer import inner_outer
 from design.chapters_3_4.tracking import RolledOff, TrackingConditions, outer_part
 from design.stability.margins import tracking_floor
-from identification.base.arrays import Real
+from identification.base.arrays import Real, Whole
 from identification.base.errors import InputError
 from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
@@ -82,6 +82,11 @@ class Loop:
         roots = (*self.roots, *(complex(-rate),) * bool(order))
         return peak(lambda omega: of(omega, np.array([rate]), order)[0], roots)[0]
 
+    def meets(self, rate: float, order: int, limit: float, most: float) -> bool:
+        """Whether ||W_a C S|| <= limit and ||S|| <= most with a roll-off, as far as the search shows."""
+        robust = self.peak(self.robustness, rate, order) <= limit
+        return robust and (most == np.inf or self.peak(self.sensitivity, rate, order) <= most)
+
 
 def least_order(plant: PlantModel) -> int:
     """How many poles of the roll-off the controller cannot do without.
@@ -100,6 +105,7 @@ def robust_outer_part(
     poles: Sequence[complex],
     level: float,
     order: int | None = None,
+    most: float = np.inf,
 ) -> Redesign:
     """The latest roll-off found of T_so with ||W_a C S|| <= level.
 
@@ -115,6 +121,8 @@ def robust_outer_part(
         Between 0 and 1.
     order
         Of the roll-off; every one from the least to MOST_POLES more unless given.
+    most
+        That ||S|| is to be, as far as a search on a refined grid shows.
 
     Raises
     ------
@@ -145,16 +153,18 @@ def robust_outer_part(
         tried = rates if order else rates[:1]
         seen = loop.robustness(coarse, tried, order).max(axis=1)
         best = min(best, float(seen.min()))
-        for k in np.flatnonzero(seen <= limit):
-            if loop.peak(loop.robustness, float(tried[k]), order) <= limit:
-                rate = _latest(loop, float(tried[k]), float(tried[k - 1]), order, limit) if k else float(tried[k])
-                met += _proved(plant, bound, loop, rate, order, limit)
+        for calm in (np.inf, most)[: 1 + (most < np.inf)]:  # the latest that meets the level is the calmest, mostly
+            found = _latest_of(loop, tried, np.flatnonzero(seen <= limit), order, limit, calm)
+            proved = [] if found is None else _proved(plant, bound, loop, found, order, limit)
+            if proved and proved[0].sensitivity <= most:
+                met += proved
                 break
     if met:
         return min(met, key=lambda redesign: redesign.sensitivity)
+    beside = f" with ||S|| <= {most:g}" if most < np.inf else ""
     raise InputError(
-        f"no roll-off tried, of up to {orders[-1]} poles, brings ||W_a C S|| below {best:.4g}, the level "
-        f"is {level:g}; expected a slower a, e and f (no controller gets below {floor:.4g})"
+        f"no roll-off tried, of up to {orders[-1]} poles, brings ||W_a C S|| below {best:.4g}{beside}, the level is "
+        f"{level:g}; expected a slower a, e and f (no controller gets below {floor:.4g})"
     )
 
 
@@ -216,9 +226,15 @@ def _proved(
     return []
 
 
-def _latest(loop: Loop, low: float, high: float, order: int, limit: float) -> float:
-    """Bisection between a rate that meets the limit and a greater one that does not, to 1e-3."""
-    while high > low * 1.001:
-        middle = float(np.sqrt(low * high))
-        low, high = (middle, high) if loop.peak(loop.robustness, middle, order) <= limit else (low, middle)
-    return low
+def _latest_of(loop: Loop, rates: Real, candidates: Whole, order: int, limit: float, most: float) -> float | None:
+    """The first of falling rates, among the candidates, that meets the limits, raised by bisection to 1e-3."""
+    for k in candidates:
+        low = float(rates[k])
+        if not loop.meets(low, order, limit, most):
+            continue
+        high = float(rates[k - 1]) if k else low
+        while high > low * 1.001:
+            middle = float(np.sqrt(low * high))
+            low, high = (middle, high) if loop.meets(middle, order, limit, most) else (low, middle)
+        return low
+    return None

@@ -19,6 +19,7 @@ from experiments.runs.design_loop import Controller, plant_loop, realized_contro
 from experiments.runs.guarantee import Guarantee, guarantee_within
 from experiments.runs.metrics import last_saturation, settling_time
 from experiments.runs.references import Reference
+from experiments.runs.region import require_short
 from experiments.runs.sector_promise import judge_run
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
@@ -172,6 +173,7 @@ class _Runner:
         }
         self.reference = campaign.reference
         samples = campaign.periods * SAMPLES_PER_PERIOD + 1
+        require_short(design.loop_plant, campaign.horizon_s)
         self.time_s = np.linspace(0.0, campaign.horizon_s, samples)
         self.early = SAMPLES_PER_PERIOD // 4  # samples before the peak counts
 

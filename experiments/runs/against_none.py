@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from design.blocks.block import fastest_root, plant_block
 from design.design_file import Design
-from experiments.engine.simulate import DivergenceError, limit_pair
+from experiments.engine.compiled_loop import FURTHEST as STEP
+from experiments.engine.saturated_loop import SaturatedLoop
+from experiments.engine.simulate import DivergenceError, Run, limit_pair, simulate
+from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference
-from experiments.runs.simulate_design import SAMPLES, simulate_design
+from experiments.runs.region import GROWTH, require_within_region
+from experiments.runs.sector_promise import finely
+from experiments.runs.simulate_design import SAMPLES
+from identification.base.errors import InputError
 
 ROOM = 1.2
 """Limits over what the reference needs, unless limits are given."""
 BAND = 0.01  # of the reference's amplitude: nearer to the loop without limits a run has recovered
-PERIODS = 10  # of the slowest sinusoid, or recovery times of a constant
-SAME = 1e-3  # by which one run must be worse than another, of it
+PERIODS = 10  # of the slowest sinusoid, or recovery times of a constant; fewer where they take more than
+STEPS = 1e5  # of the engine, for one run
+WORTH = 0.1  # of BAND, and
+SAME = 1e-3  # of the other: by so much one run must be worse than another
 
 
 @dataclass(frozen=True)
@@ -31,7 +40,7 @@ class Outcome:
     last_error
         The largest distance of y from it in the last period, over the amplitude.
     largest_control
-        The largest \\|u\\| over the larger limit.
+        The largest \\|u\\| over the larger limit, also between the samples.
     """
 
     recovery_s: float
@@ -47,37 +56,54 @@ class Comparison:
     ----------
     limits
         (lower, upper), in the actuator's unit.
+    until_s
+        Length of the runs in seconds.
     outcomes
         ``none`` first, then every anti-windup of the design.
     """
 
     limits: tuple[float, float]
+    until_s: float
     outcomes: dict[str, Outcome]
 
     def is_worse(self, name: str) -> bool:
         """Whether a run recovers later than without anti-windup, or is farther off in the last period."""
         own, none = self.outcomes[name], self.outcomes["none"]
         later = own.recovery_s > none.recovery_s * (1 + SAME)
-        return later or own.last_error > none.last_error * (1 + SAME) + BAND * SAME
+        return later or own.last_error > none.last_error * (1 + SAME) + WORTH * BAND
 
     def __str__(self) -> str:
-        """A sentence for each anti-windup, those that are worse than none first."""
+        """A sentence for each anti-windup, those that are worse than none first; one where no run reaches a limit."""
+        if all(each.largest_control <= 1 for each in self.outcomes.values()):
+            return (
+                f"no anti-windup acts under the limits {self._limits}: |u| reaches "
+                f"{self.outcomes['none'].largest_control:.3g} times the limit"
+            )
         names = sorted((name for name in self.outcomes if name != "none"), key=lambda name: not self.is_worse(name))
         return "\n".join(self._sentence(name) for name in names)
 
+    @property
+    def _limits(self) -> str:
+        low, high = self.limits
+        return f"+-{high:.4g}" if low == -high else f"{low:.4g} to {high:.4g}"
+
     def _sentence(self, name: str) -> str:
         own, none = self.outcomes[name], self.outcomes["none"]
-        times = [_seconds(each.recovery_s) for each in (own, none)]
+        times = [self._recovers(each) for each in (own, none)]
         errors = [_percent(each.last_error) for each in (own, none)]
-        low, high = self.limits
-        limits = f"+-{high:.4g}" if low == -high else f"{low:.4g} to {high:.4g}"
         worse = "WORSE" if self.is_worse(name) else "no worse"
         return (
-            f"{name} is {worse} than no anti-windup under the limits {limits}: it recovers {times[0]} "
-            f"(none {times[1]}), "
-            f"is {errors[0]} off in the last period (none {errors[1]}), "
+            f"{name} is {worse} than no anti-windup under the limits {self._limits}: it recovers {times[0]} "
+            f"(none {times[1]}), is {errors[0]} off in the last period (none {errors[1]}), "
             f"and |u| reaches {own.largest_control:.3g} times the limit (none {none.largest_control:.3g})"
         )
+
+    def _recovers(self, outcome: Outcome) -> str:
+        if outcome.recovery_s == 0:
+            return "at once"
+        if math.isinf(outcome.recovery_s):
+            return f"not within {self.until_s:.3g} s"
+        return f"after {outcome.recovery_s:.3g} s"
 
 
 def against_none(
@@ -90,7 +116,8 @@ def against_none(
     design
         Of either kind.
     reference
-        r(t); unless given, sinusoids of amplitude 1 at the frequencies of the design.
+        r(t); unless given, sinusoids of amplitude 1 at the frequencies of the design, all at their crests as it begins:
+        a start that saturates most loops.
     limits
         (lower, upper); unless given, ROOM times the most that the control of perfect tracking reaches, or half of the
         largest \\|u\\| without limits where that needs none.
@@ -98,42 +125,60 @@ def against_none(
     Raises
     ------
     InputError
-        The loop without limits cannot be simulated.
+        The loop cannot be simulated, or one period of the reference takes too many steps.
     """
+    plant, omegas = design.loop_plant, design.reference_omegas
     if reference is None:
-        omegas = design.reference_omegas
-        reference = Reference((1.0,) * len(omegas), omegas, tuple(0.0 if w else math.pi / 2 for w in omegas), 0.0)
+        reference = Reference((1.0,) * len(omegas), omegas, (math.pi / 2,) * len(omegas), 0.0)
+    until, period = _length(design, reference)
+    times = np.linspace(0.0, until, SAMPLES)
+    free = simulate(design_loop(design, reference, None), (-math.inf, math.inf), times)
+    if limits is None:
+        needed = reference.required(plant).at_most
+        limits = limit_pair(ROOM * needed if 0 < needed < math.inf else float(np.abs(free.control).max()) / 2)
+    require_within_region(plant, reference, limits)
+    outcomes = {
+        name: _outcome(design_loop(design, reference, name), limits, free, reference, period)
+        for name in ("none", *design.anti_windup)
+    }
+    return Comparison(limits, until, outcomes)
+
+
+def _length(design: Design, reference: Reference) -> tuple[float, float]:
+    """How long to run, and what is called the last period, in seconds."""
     recovery = design.corrected.judgement.recovery_s
     period = reference.period_s if math.isfinite(reference.period_s) else recovery
-    until = max(PERIODS * period, 3 * recovery)
-    free = simulate_design(design, math.inf, reference, None, until_s=until)
-    if limits is None:
-        needed = reference.required(design.loop_plant).at_most
-        limits = limit_pair(ROOM * needed if 0 < needed < math.inf else float(np.abs(free.control).max()) / 2)
-    last = free.time_s >= until - period
-    outcomes = {}
-    for name in ("none", *design.anti_windup):
-        try:
-            run = simulate_design(design, limits, reference, name, until_s=until, samples=SAMPLES)
-        except DivergenceError:
-            outcomes[name] = Outcome(math.inf, math.inf, math.inf)
-            continue
-        off = np.abs(run.outputs["output"] - free.outputs["output"]) / reference.amplitude
-        beyond = np.flatnonzero(off > BAND)
-        end = float(run.time_s[beyond[-1]]) if len(beyond) else 0.0
-        outcomes[name] = Outcome(
-            recovery_s=math.inf if end == until else end,
-            last_error=float(off[last].max()),
-            largest_control=float(np.abs(run.control).max()) / max(-limits[0], limits[1]),
-        )
-    return Comparison(limits, outcomes)
+    blocks = (plant_block(design.loop_plant), *design.controller_parts(), design.corrected.kind.one_plus)
+    most = STEPS * STEP / fastest_root(*blocks)
+    unstable = max((pole.real for pole in design.loop_plant.unstable_poles), default=0.0)
+    until = min(max(PERIODS * period, 3 * recovery), most, GROWTH / unstable if unstable else math.inf)
+    if until < period:
+        why = "the plant's unstable pole" if until < most else "the loop's fastest root"
+        raise InputError(f"a period of the reference is {period:.4g} s, and {why} lets a run last {until:.4g} s")
+    return until, period
+
+
+def _outcome(
+    loop: SaturatedLoop, limits: tuple[float, float], free: Run, reference: Reference, period: float
+) -> Outcome:
+    times = free.time_s
+    try:
+        run = simulate(loop, limits, times)
+    except DivergenceError:
+        return Outcome(math.inf, math.inf, math.inf)
+    control = run.control
+    if len(run.events_s):
+        more = finely(loop, run, reference)
+        control = np.append(control, simulate(replace(loop, outputs={}), limits, more).control)
+    off = np.abs(run.outputs["output"] - free.outputs["output"]) / reference.amplitude
+    beyond = np.flatnonzero(off > BAND)
+    end = float(times[beyond[-1]]) if len(beyond) else 0.0
+    return Outcome(
+        recovery_s=math.inf if end == times[-1] else end,
+        last_error=float(off[times >= times[-1] - period].max()),
+        largest_control=float(np.abs(control).max()) / max(-limits[0], limits[1]),
+    )
 
 
 def _percent(share: float) -> str:
     return f"{100 * share:.3g} %" if share >= 1e-5 else "less than 0.001 %"
-
-
-def _seconds(time_s: float) -> str:
-    if time_s == 0:
-        return "at once"
-    return f"after {time_s:.3g} s" if math.isfinite(time_s) else "never"

@@ -59,9 +59,19 @@ class Reference:
                 f"the reference has {len(self.omegas)} frequencies, {len(self.amplitudes)} amplitudes and "
                 f"{len(self.phases_rad)} phases; expected as many of each, and one at least"
             )
-        numbers = [*self.amplitudes, *self.omegas, *self.phases_rad, self.offset, self.slope]
-        if not np.isfinite(numbers).all() or min(self.omegas) < 0:
-            raise InputError(f"the reference is {self}; expected finite numbers and omega >= 0")
+        numbers = {
+            "amplitude": self.amplitudes,
+            "frequency": self.omegas,
+            "phase": self.phases_rad,
+            "offset": (self.offset,),
+            "slope": (self.slope,),
+        }
+        for name, values in numbers.items():
+            for value in values:
+                if not math.isfinite(value) or (name == "frequency" and value < 0):
+                    raise InputError(
+                        f"a {name} of the reference is {value:g}; expected a finite number, no frequency < 0"
+                    )
 
     def __call__(self, time_s: np.ndarray) -> np.ndarray:
         """r at times of any shape."""

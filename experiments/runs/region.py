@@ -1,13 +1,17 @@
-"""Where limits can hold a plant with a pole in the open right half plane, and the references that leave it."""
+"""Where limits can hold a plant with a pole in the open right half plane: the references and the runs that leave it."""
 
 from __future__ import annotations
 
+import cmath
 import math
 
 from experiments.runs.references import Reference, SampledReference
-from identification.base.digits import told_apart
+from experiments.runs.steady_control import Wave, peak, response, steady_constant
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
+
+GROWTH = 25.0
+"""Time constants of the fastest unstable pole that a run lasts at most: its rounding has grown to 1e-5 by then."""
 
 
 def require_within_region(
@@ -20,35 +24,62 @@ def require_within_region(
     plant
         The true plant.
     reference
-        r(t); samples are judged by their largest and least value, held as constants.
+        r(t); samples are judged by their last value, which is held for ever.
     limits
         (lower, upper), in the actuator's unit.
 
     Raises
     ------
     InputError
-        The plant has a pole p with Re p > 0 and its control on the reference reaches a limit.
+        The plant has a pole p with Re p > 0, and its mode on the reference reaches the border of the region.
 
     Notes
     -----
-    The mode of a real pole obeys z' = p z + u in the control's unit: from |z| > L/p on it grows whatever |u| <= L is.
-    On a constant it stands at |u|/p, so that a reference whose control reaches L stands on the border. That a control
-    stays within the limits is necessary and not sufficient: a transient may leave the region, and the run diverges.
+    The mode obeys z' = p z + u in the control's unit. With u between the limits a real p lets z be held only between
+    -upper/p and -lower/p. A control amplitude sin(omega t) moves it by amplitude/|j omega - p|. For a pair of poles the
+    wider interval with Re p is taken. That z on the reference stays inside is necessary and not sufficient: a transient
+    may leave the region, and the run diverges.
     """
-    if not plant.unstable_poles:
+    low, high = limits
+    if not plant.unstable_poles or math.isinf(high - low):
         return
     if isinstance(reference, SampledReference):
-        at_rest = float(abs(plant.without_delay()(0j))) if plant.integrators <= 0 else math.inf
-        needed = float(abs(reference.values).max()) / at_rest
+        constant, sinusoids = steady_constant(plant, float(reference.values[-1]), 0.0), []
     else:
-        needed = reference.required(plant).value
-    low, high = limits
-    nearer = min(-low, high)
-    if needed >= nearer:
-        pole = max(plant.unstable_poles, key=lambda pole: pole.real)
-        control, limit = told_apart(needed, nearer, 4, lambda value, digits: f"{value:.{digits}g}")
+        parts = zip(reference.amplitudes, reference.omegas, reference.phases_rad, strict=True)
+        sinusoids = [response(plant, *part) for part in parts if part[1] > 0]
+        constant = steady_constant(plant, math.fsum(reference.constants), reference.slope)
+    for pole in plant.unstable_poles:
+        waves = [_moved(wave, pole) for wave in sinusoids]
+        middle, half = -(low + high) / (2 * pole.real), (high - low) / (2 * pole.real)
+        at_rest = -constant / pole.real if pole.imag == 0 else middle
+        reached = peak(waves, at_rest - middle).value / half if math.isfinite(constant) else math.inf
+        if reached >= 1:
+            raise InputError(
+                f"the plant has a pole at {pole:.4g} rad/s in the right half plane, and the reference takes its mode "
+                f"{reached:.4g} times as far as the limits {low:g} to {high:g} can hold it: it escapes for ever; "
+                "expected a smaller reference or wider limits"
+            )
+
+
+def require_short(plant: PlantModel, until_s: float) -> None:
+    """Refuse a run in which the engine's own rounding, which grows like exp(p t) with an unstable pole, would show.
+
+    Raises
+    ------
+    InputError
+        The run is longer than :data:`GROWTH` time constants of the plant's fastest unstable pole.
+    """
+    fastest = max((pole.real for pole in plant.unstable_poles), default=0.0)
+    if fastest * until_s > GROWTH:
         raise InputError(
-            f"the plant has a pole at {pole:.4g} rad/s in the right half plane and the reference takes a control of "
-            f"{control}, the nearer limit is {limit}: once the control is at its limit the plant escapes for ever; "
-            f"expected a reference of less than {nearer / needed:.3g} times this one"
+            f"the run lasts {until_s:g} s; the plant has a pole at {fastest:.4g} rad/s in the right half plane, with "
+            f"which the engine's rounding grows like exp({fastest:.4g} t), so that {GROWTH / fastest:.4g} s are "
+            "expected at most, or the sampled controller, which has no such mode"
         )
+
+
+def _moved(wave: Wave, pole: complex) -> Wave:
+    """What a wave of the control makes of the mode of a pole."""
+    turned = 1j * wave.omega - pole
+    return Wave(wave.amplitude / abs(turned), wave.omega, wave.phase_rad - cmath.phase(turned), wave.doubt)

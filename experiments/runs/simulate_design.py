@@ -13,7 +13,7 @@ from experiments.runs.compare_anti_windups import span
 from experiments.runs.design_loop import design_loop
 from experiments.runs.disturbances import UNDISTURBED, Disturbances
 from experiments.runs.references import Reference, SampledReference
-from experiments.runs.region import require_within_region
+from experiments.runs.region import require_short, require_within_region
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
@@ -67,12 +67,14 @@ def simulate_design(
     ------
     InputError
         The design holds no such anti-windup, fewer samples than two are asked for, the reference leaves the region of
-        an unstable plant (:mod:`experiments.runs.region`), or see :func:`experiments.engine.simulate.simulate`.
+        an unstable plant or the run is too long for it (:mod:`experiments.runs.region`), or see
+        :func:`experiments.engine.simulate.simulate`.
     """
     if samples < 2:
         raise InputError(f"{samples} samples are asked for; expected two or more")
     if until_s is None:
         until_s = PERIODS * span(design, reference) if isinstance(reference, Reference) else reference.time_s[-1]
     require_within_region(plant or design.loop_plant, reference, limit_pair(limits))
+    require_short(plant or design.loop_plant, until_s)
     loop = design_loop(design, reference, anti_windup, plant, disturbances)
     return simulate(loop, limit_pair(limits), np.linspace(0.0, until_s, samples), rate=rate_limit)

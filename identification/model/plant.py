@@ -133,8 +133,8 @@ class PlantModel:
         Raises
         ------
         InputError
-            See :func:`identification.model.python_control.from_control`; a pole lies right of the imaginary axis; a
-            root lies on it but not at s = 0; or rounding hides whether a pole is at s = 0, see :data:`NEAR_ZERO`.
+            See :func:`identification.model.python_control.from_control`; a root lies on the imaginary axis but not at
+            s = 0; or rounding hides whether a pole is at s = 0, see :data:`NEAR_ZERO`.
         """
         gain, every, found = from_control(system)
         zeros, poles = sorted(every, key=abs), sorted(found, key=abs)

@@ -19,6 +19,7 @@ from experiments.engine.pade import with_pade
 from experiments.engine.simulate import simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import sinusoid
+from experiments.runs.region import require_within_region
 from experiments.runs.simulate_design import simulate_design
 from identification.base.errors import InputError
 from identification.model.additive_bound import AdditiveBound
@@ -135,10 +136,15 @@ def test_a_reference_beyond_the_region_of_an_unstable_plant_is_refused() -> None
     plant = PlantModel(2.0, (), (), 0.05, 0, real_poles=(3.0, -1.0))
     design = design_extended(IdentifiedModel(plant, bound_of(plant, 2.0, 0.005)), [0.5])
     needed = 1 / abs(complex(plant.without_delay()(0.5j)))
-    with pytest.raises(
-        InputError, match=r"a pole at 1\+0j rad/s in the right half plane .* less than 0.8 times this one"
-    ):
-        simulate_design(design, 0.8 * needed, sinusoid(1.0, 0.5))
+    border = needed / abs(0.5j - 1)  # z' = z + u
+    with pytest.raises(InputError, match=r"a pole at 1\+0j rad/s in the right half plane, .* 1.25 times as far"):
+        simulate_design(design, 0.8 * border, sinusoid(1.0, 0.5), until_s=8.0)
+    require_within_region(plant, sinusoid(1.0, 0.5), (-1.01 * border, 1.01 * border))
+    require_within_region(plant, sinusoid(0.0, 0.5, offset=10.0), (-1.0, 5.1))  # u = 5, whatever the other limit
+    with pytest.raises(InputError, match=r"times as far as the limits -1 to 4.9"):
+        require_within_region(plant, sinusoid(0.0, 0.5, offset=10.0), (-1.0, 4.9))
+    with pytest.raises(InputError, match=r"the run lasts 26 s; .* so that 25 s are expected at most"):
+        simulate_design(design, 3 * needed, sinusoid(1.0, 0.5), until_s=26.0)
     assert simulate_design(design, 3 * needed, sinusoid(1.0, 0.5), until_s=8.0).time_s[-1] == 8.0
 
 

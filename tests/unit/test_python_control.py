@@ -65,10 +65,16 @@ def test_state_spaces_in_any_coordinates_keep_their_integrator(seed: int) -> Non
     assert said == "1" or said.endswith("expected integrators to say how many there are")
 
 
+def test_a_pole_in_the_right_half_plane_comes_along() -> None:
+    system = control.tf([2.0], [1.0, 1.0, -6.0])  # 2/((s + 3) (s - 2))
+    found = PlantModel.from_control(system)
+    assert sorted(found.real_poles) == pytest.approx([-2.0, 3.0])
+    np.testing.assert_allclose(found(1j * OMEGA), system(1j * OMEGA), rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("system", "part"),
     [
-        (control.tf([1.0], [1.0, -1.0]), "a number of real_poles is -1"),
         (control.tf([1.0], [1.0, 0.0, 4.0]), "zeta is"),
         (control.tf([1.0], [1.0, 0.5], 0.1), "of discrete time, dt = 0.1"),
         (control.ss([[-1.0]], [[1.0, 1.0]], [[1.0]], [[0.0, 0.0]]), "2 inputs and 1 outputs"),

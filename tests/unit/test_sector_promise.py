@@ -353,7 +353,7 @@ def test_simulate_says_first_whether_its_run_is_covered(
         (
             "45",
             "corrected",
-            "Within the guarantee of continuous time, which knows no computer and no drive: the run",
+            "No guarantee on a computer; in continuous time the run would be within it: the run",
         ),
         ("400", "corrected", "10001 rows -> "),
         ("12", "thesis", "No guarantee: theta2 is not stable"),
