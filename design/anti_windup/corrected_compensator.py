@@ -18,7 +18,7 @@ from identification.model.additive_bound import AdditiveBound
 SETTLED = 0.01  # what is left of y_d after the recovery time
 RATES = 48  # values of the rate in a decade
 SPREAD = 1536  # values of b in a decade
-DECADES = 5  # below the bandwidth in which poles are looked for
+DECADES = 5  # below the bandwidth in which poles are looked for, where they may be faster than asked
 COARSE = 16  # every so many of them, and of these every eighth first, with every fourth of the rates
 OPEN = 1.05  # by which f may be worse at a coarse b for the finer ones beside it to be tried
 NEAREST = 6  # solutions by which the points of a finer lattice are first tried
@@ -65,7 +65,8 @@ def corrected(
 
     p_i being the q plant poles outside the open left half plane, N the order of W_a, n monic of degree N with
     Re n/d >= 0.1 on the axis, d being W_a's monic denominator; rate = bandwidth/10^(i/48), b = bandwidth/10^(j/1536)
-    for whole i, j, none below bandwidth/10^5; or prod(s - p_i)/(s + bandwidth)^q, the washout, where that is better.
+    for whole i, j, none below bandwidth/10^5 if ``faster``; or the washout, prod(s - p_i)/(s + bandwidth)^q, where that
+    is better; unless ``faster`` it has the rate in the place of the bandwidth, but where nothing else is found.
 
     Parameters
     ----------
@@ -113,9 +114,10 @@ def corrected(
             f"the bandwidth of the anti-windup is {bandwidth:g} rad/s; expected {slowest:g} or more and a finite one, "
             f"since the recovery in {recovery_s:g} s takes this rate"
         )
-    decades = min(float(np.log10(bandwidth / slowest)) + 1e-9, DECADES)
+    decades = min(float(np.log10(bandwidth / slowest)) + 1e-9, DECADES if faster else np.inf)
     slowest = bandwidth / 10**decades
     search = _Search(unstable, bound, condition, bandwidth, slowest)
+    search.take_washout(unstable, bandwidth if faster else bandwidth * 10.0 ** (-int(RATES * decades) / RATES))
     i, j = (each.ravel() for each in np.indices((int(RATES * decades) + 1, int(SPREAD / COARSE * decades) + 1)))
     if not faster:
         i, j = i[i == i.max()], j[i == i.max()]
@@ -128,6 +130,8 @@ def corrected(
     beside = np.concatenate([np.arange(1 - COARSE, 0), np.arange(1, COARSE)])
     fine = np.unique([np.repeat(i[near], len(beside)), (j[near, None] + beside).ravel()], axis=1)
     search.run(*fine[:, fine[1] >= 0])
+    if search.best is None:
+        search.take_washout(unstable, bandwidth)
     if search.best is None:
         raise NoCompensatorError(
             f"no theta1~ of our class with poles from {slowest:g} to {bandwidth:g} rad/s was found that meets "
@@ -152,13 +156,16 @@ class _Search:
         self.program = CorrectedProgram(unstable, bound, condition, bandwidth, slowest)
         self.known: list[tuple[float, float, Vertex]] = []
         self.least: dict[tuple[int, int], float] = {}
-        washout = from_one_plus(Block(1.0, unstable, (complex(-bandwidth),) * len(unstable)))
         self.best: AntiWindup | None = None
         self.f = self.best_lower = np.inf
-        if condition.holds(washout):
-            self.best, self.f = washout, searched_norm(self.W_a * washout.one_plus)[0]
         # no f is below |W_a| at infinity, where 1 + theta1~ is 1
         self.floor = 0.0 if self.W_a.relative_degree else self.W_a.gain
+
+    def take_washout(self, unstable: tuple[complex, ...], rate: float) -> None:
+        """Make the washout of a rate in rad/s the best so far if it meets the condition."""
+        washout = from_one_plus(Block(1.0, unstable, (complex(-rate),) * len(unstable)))
+        if self.condition.holds(washout):
+            self.best, self.f = washout, searched_norm(self.W_a * washout.one_plus)[0]
 
     @property
     def wanted(self) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from design.anti_windup.chosen_guarantee import chosen_guarantee
 from design.anti_windup.compensator import AntiWindup, second_order, uncertainty_cost
 from design.anti_windup.condition import Robustness, Sector
-from design.anti_windup.corrected_compensator import SETTLED, NoCompensatorError, corrected
+from design.anti_windup.corrected_compensator import DECADES, SETTLED, NoCompensatorError, corrected
 from design.anti_windup.kyp_certificate import Rows, certificate, proved_storage
 from design.anti_windup.popov import popov_sector, robust_loss, robust_popov_sector
 from design.anti_windup.thesis_compensator import thesis_choice
@@ -21,6 +21,8 @@ from identification.base.errors import InputError, shown
 from identification.base.json_object import Reader, numbers, or_none, record
 from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
+
+BEYOND = 1000  # times the loop's own rate, or the plant's fastest root: as far as a root of W_a alone may be followed
 
 
 @dataclass(frozen=True)
@@ -241,14 +243,16 @@ def compensators(
     bandwidth
         Of the corrected compensator in rad/s; unless given, that of the fastest root of the plant and of W_a, which is
         as far as they say anything, and at least ten times the rate ln(100)/own_s. It does not depend on
-        ``recovery_s``, so that f does not increase with it.
+        ``recovery_s``, so that f does not increase with it. It is at most 10^5 times that rate, so that the lattice of
+        the poles reaches down to it.
     guarantee, sector, robustness
         Of the corrected compensator, see :func:`design.anti_windup.chosen_guarantee.chosen_guarantee`. Where the sector
         is not stated and no compensator has it, the next of :data:`design.choices.WEAKER` is taken.
     highest_omega
         Highest frequency in rad/s at which the plant was measured; None where it is not known. A root of W_a beyond it
         says nothing of the plant, so that the bandwidth that is not given ends there, or at the loop's own rate
-        ln(100)/own_s where that is faster.
+        ln(100)/own_s where that is faster. Where it is not known the bandwidth ends at 1000 times the plant's fastest
+        root or that rate, whichever is faster.
 
     Raises
     ------
@@ -257,11 +261,13 @@ def compensators(
     """
     alpha, beta, gamma = thesis_choice(bound)
     own_rate = float(np.log(1 / SETTLED)) / own_s
+    P = plant_block(plant)
     if bandwidth is None:
-        bandwidth = max(fastest_root(plant_block(plant), bound_block(bound)), 10 * own_rate)
+        known = BEYOND * max([own_rate, *map(abs, P.zeros + P.poles)])
         if highest_omega is not None:
-            bandwidth = max(min(bandwidth, highest_omega), own_rate)
-    unstable, pace = plant_block(plant).unstable_poles, own_s if recovery_s is None else recovery_s
+            known = max(highest_omega, own_rate)
+        bandwidth = min(max(fastest_root(P, bound_block(bound)), 10 * own_rate), known, 10**DECADES * own_rate)
+    unstable, pace = P.unstable_poles, own_s if recovery_s is None else recovery_s
     name, condition, said = chosen_guarantee(unstable, guarantee, sector, robustness)
     weaker = [Sector(k) for k in WEAKER if isinstance(condition, Sector) and sector is None]
     while True:

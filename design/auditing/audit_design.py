@@ -197,18 +197,17 @@ def covered_delay(plant: PlantModel, bound: AdditiveBound) -> float:
         if top > farthest:
             return 0.0  # |W_a| tends to 2 |P| and not from above, as far as rounding shows
         top *= 2
-    over_s = share * Block(1.0, (), (0j,)) if 0 in share.zeros else share
-    best = np.inf
+    over_s = share * Block(1.0, (), (0j,))
+    rest = Block(over_s.gain, *(tuple(root for root in roots if root) for roots in (over_s.zeros, over_s.poles)))
+    order, best = -over_s.poles.count(0), np.inf
 
     def judge(centre: np.ndarray, half: np.ndarray) -> np.ndarray:
         nonlocal best
         found = jet((over_s,), 0.0, centre, half)
-        if over_s is share:  # no integrator
-            least, here, at = found.least / (centre + half), np.abs(found.value) / centre, centre + half
-        else:
-            least, here, at = found.least, np.abs(found.value), centre - half
-        best = min(best, float(np.min(_shift(here, centre))))
-        return np.where(_shift(least, at) < (1 - CERTAIN) * best, HALVE, NO_ZERO)
+        # where a pole at zero is near, only what is left without it is bounded
+        least = np.maximum(found.least, jet((rest,), 0.0, centre, half).least * (centre + half) ** order)
+        best = min(best, float(np.min(_shift(np.abs(found.value), centre))))
+        return np.where(_shift(least, centre - half) < (1 - CERTAIN) * best, HALVE, NO_ZERO)
 
     judged_cells(judge, first_edges(share.zeros + share.poles, top))
     return float((1 - CERTAIN) * best)

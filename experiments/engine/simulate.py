@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from experiments.engine import integrator
-from experiments.engine.compiled_loop import BRIEF, CompiledLoop, compile_loop
+from experiments.engine.compiled_loop import BRIEF, FURTHEST, CompiledLoop, compile_loop
 from experiments.engine.saturated_loop import SaturatedLoop, with_actuator
 from experiments.engine.watched import Stopped, Tick, watched
 from identification.base.errors import InputError, shown
@@ -214,16 +214,21 @@ def simulate_watched(
 
 
 def _require_affordable(compiled: CompiledLoop, room: int, horizon: float) -> None:
+    step, shortest = compiled.step, float(compiled.delays[~compiled.brief].min(initial=math.inf))
+    asked = (
+        f"the shortest dead time, {shortest:.3g} s, asks for"
+        if step > shortest / 2
+        else (f"a root of the loop near {FURTHEST / step:.3g} rad/s asks for")
+    )
     if room * compiled.tables.increments.shape[2] > MOST_ROOM:
         raise InputError(
-            f"the dead times reach from {compiled.delays.min():.3g} to {compiled.delays.max():.3g} s, too many "
-            "steps to remember; expected dead times that differ less, or zero"
+            f"{asked} steps of {step:.3g} s, too many to remember in the longest dead time, "
+            f"{compiled.delays.max():.3g} s; expected dead times that differ less, or a slower design"
         )
-    if horizon / compiled.step > MOST_STEPS:
+    if horizon / step > MOST_STEPS:
         raise InputError(
-            f"the run needs {horizon / compiled.step:.3g} steps of {compiled.step:.3g} s, set by its shortest dead "
-            f"time or fastest pole; expected at most {MOST_STEPS:.3g} (a shorter run, a dead time of zero, or a slower "
-            "design)"
+            f"{asked} {horizon / step:.3g} steps of {step:.3g} s; expected at most {MOST_STEPS:.3g} (a shorter run, a "
+            "dead time of zero, or a slower design)"
         )
 
 

@@ -56,6 +56,20 @@ def test_dead_times_within_the_bound(implied: IdentifiedModel) -> None:
     assert covered_delay(PlantModel(1e-6, (), (), 0.1), AdditiveBound(1.0, (), (), (1.0,), (2.0,))) > 1e5
 
 
+@pytest.mark.parametrize("integrators", [-2, -1, 0])
+def test_dead_times_within_the_bound_of_other_plants(integrators: int) -> None:
+    """Nearly the same at all frequencies beyond the poles, with zeros at s = 0 too: the least on a fine grid."""
+    omega = np.geomspace(1e-4, 1e6, 400_001)
+    rng = np.random.default_rng(integrators + 2)
+    for _ in range(4):
+        poles = (1.0, 3.0, *10 ** rng.uniform(-1, 2, -integrators))
+        plant = PlantModel(1.0, (), (), 0.01, integrators, (), poles)
+        bound = AdditiveBound(10 ** rng.uniform(-3, -1), (), (), (), (10 ** rng.uniform(-1, 2),))
+        ratio = np.abs(bound(1j * omega) / plant(1j * omega))
+        least = np.min(np.where(ratio < 2, 2 / omega * np.arcsin(np.minimum(ratio / 2, 1.0)), np.inf))
+        assert covered_delay(plant, bound) == pytest.approx(least, rel=1e-6)
+
+
 def test_no_bound_covers_the_integrators_gain(implied: IdentifiedModel) -> None:
     plant, bound = implied.plant, implied.additive_bound
     for change in (1e-2, 1e-6):

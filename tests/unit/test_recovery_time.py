@@ -149,3 +149,15 @@ def test_a_whole_extended_design_in_other_units(
         return
     # gamma is the minimum of a flat function: to the root of the accuracy of f
     assert designed(10**time_unit, 10**gain_unit) == pytest.approx(here, rel=1e-6)
+
+
+@pytest.mark.parametrize("bandwidth", [None, 1e8])
+def test_a_root_of_the_bound_far_beyond_the_loop_makes_no_recovery_faster(bandwidth: float | None) -> None:
+    """W_a has a root at 1e8 rad/s where nobody measured: theta1~ was as fast as that, the loop takes 3.5 s."""
+    plant, bound = PlantModel(1.0, (), (), 0.1, 1, (), (1.0,)), AdditiveBound(0.02, (), (), (), (1e8,))
+    found = design_extended(IdentifiedModel(plant, bound), [0.1 * np.pi], bandwidth=bandwidth)
+    own_rate = found.free.pace
+    assert found.corrected.bandwidth == pytest.approx(1000 * own_rate if bandwidth is None else bandwidth)
+    slowest = min(-pole.real for pole in found.corrected.kind.one_plus.poles)
+    assert own_rate * (1 - 1e-9) <= slowest <= own_rate * 10 ** (1 / 48)
+    assert found.corrected.judgement.f <= 0.02 * (1 + 1e-9)  # of the washout
