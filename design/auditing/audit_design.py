@@ -198,7 +198,8 @@ def covered_delay(plant: PlantModel, bound: AdditiveBound) -> float:
             return 0.0  # |W_a| tends to 2 |P| and not from above, as far as rounding shows
         top *= 2
     over_s = share * Block(1.0, (), (0j,))
-    rest = Block(over_s.gain, *(tuple(root for root in roots if root) for roots in (over_s.zeros, over_s.poles)))
+    zeros, poles = (tuple(root for root in roots if root) for roots in (over_s.zeros, over_s.poles))
+    rest = Block(over_s.gain, zeros, poles)
     order, best = -over_s.poles.count(0), np.inf
 
     def judge(centre: np.ndarray, half: np.ndarray) -> np.ndarray:
