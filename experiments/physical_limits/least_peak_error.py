@@ -221,10 +221,16 @@ def harmonic(plant: PlantModel, reference: Reference) -> Reference:
         )
     if reference.slope:
         raise InputError(f"the reference has the slope {reference.slope:g} a second; expected a periodic one")
-    slowest = min((omega for omega in reference.omegas if omega > 0), default=math.inf)
+    if not any(reference.omegas):
+        raise InputError(
+            f"the reference is a constant alone, which has no period over which an error is bounded: limits that hold "
+            f"its steady control, of size {reference.required(plant).value:.6g}, allow that no error lasts; expected a "
+            "frequency above 0 rad/s too"
+        )
+    slowest = min(omega for omega in reference.omegas if omega > 0)
     harmonics = [round(omega / slowest) for omega in reference.omegas]
     near = (abs(omega - k * slowest) <= SAME * omega for omega, k in zip(reference.omegas, harmonics, strict=True))
-    if not math.isfinite(slowest) or not all(near):
+    if not all(near):
         said = ", ".join(f"{omega:.6g}" for omega in reference.omegas)
         raise InputError(f"the reference has the frequencies {said} rad/s; expected multiples of a slowest one above 0")
     return replace(reference, omegas=tuple(k * slowest for k in harmonics))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
+import clarabel
 import numpy as np
 import scipy.sparse as sparse
 from scipy.linalg import expm
-from scipy.optimize import linprog
 
 from experiments.physical_limits.certificates import Samples, forced, reached, whole
 from experiments.physical_limits.exact_chain import fastest
@@ -30,12 +30,6 @@ SPARE = 6  # steps at the end of a start from rest that only serve the averages
 LOST = 1e-3  # of the weights may lie beyond the time to which the error counts, or that much of r is hardly an error
 MOST_CELLS = 2_000_000
 GRAIN = 1e-8  # of the distance of the limits, more than a grain in so many cells
-# the first is the fastest, the others seldom fail
-ATTEMPTS: tuple[tuple[Literal["highs-ipm", "highs-ds"], bool], ...] = (
-    ("highs-ipm", True),
-    ("highs-ipm", False),
-    ("highs-ds", False),
-)
 
 
 @dataclass(frozen=True)
@@ -221,28 +215,24 @@ class PeakProgram:
         peak = sparse.csr_array(-np.ones((len(judged), 1)))
         both: Any = sparse.vstack([sparse.hstack([output, peak]), sparse.hstack([-output, peak])])
         control = slice(output.shape[1] - steps, output.shape[1])
-        bounds: Any = np.full((output.shape[1] + 1, 2), [-np.inf, np.inf])
-        bounds[control] = low, high
-        for method, presolve in ATTEMPTS:
-            solution = linprog(
-                np.append(np.zeros(output.shape[1]), 1.0),
-                A_ub=both,
-                b_ub=np.concatenate([r[sampled], -r[sampled]]),
-                A_eq=dynamics,
-                b_eq=np.zeros(n * steps),
-                bounds=bounds,
-                method=method,
-                options={"presolve": presolve},
-            )
-            if solution.status == 0:
-                break
-        else:
+        held = sparse.eye_array(output.shape[1] + 1).tocsr()[control]
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        solution = clarabel.DefaultSolver(
+            sparse.csc_matrix((both.shape[1], both.shape[1])),
+            np.append(np.zeros(output.shape[1]), 1.0),
+            sparse.csc_matrix(sparse.vstack([dynamics, both, held, -held])),
+            np.concatenate([np.zeros(n * steps), r[sampled], -r[sampled], np.full(steps, high), np.full(steps, -low)]),
+            [clarabel.ZeroConeT(n * steps), clarabel.NonnegativeConeT(both.shape[0] + 2 * steps)],
+            settings,
+        ).solve()
+        if not (np.isfinite(solution.x).all() and np.isfinite(solution.z).all()):
             raise InputError(
-                "the linear program of the least error was not solved; expected a limit nearer to the control that the "
-                f"reference takes (the solver says: {' '.join(str(solution.message).split())})"
+                f"the linear program of the least error, of {both.shape[1]} unknowns, was not solved (the solver says: "
+                f"{solution.status}); expected a plant whose poles and zeros differ less"
             )
-        u, prices = np.clip(np.asarray(solution.x)[control], low, high), np.asarray(solution.ineqlin.marginals)
-        weights = prices[: len(judged)] - prices[len(judged) :]
+        u, prices = np.clip(np.asarray(solution.x)[control], low, high), -np.asarray(solution.z)[n * steps :]
+        weights = prices[: len(judged)] - prices[len(judged) : 2 * len(judged)]
         if self._centred:
             u, weights = u - u.mean(), weights - weights.mean()
             u = u / max(1.0, u.min() / low, u.max() / high)

@@ -245,7 +245,8 @@ def test_table_of_the_start_from_rest_falls_and_is_finest_where_it_falls() -> No
         (PlantModel(1.0, (), (Mode(5.0, -0.1),), 0.0, 0), CHAPTER_4, 1.0, "of real part 0.5 rad/s; expected none"),
         (integrator(1.0), CHAPTER_4, (2.0, -3.0), "limits are 2 and -3; expected the lower one first"),
         (integrator(1.0), CHAPTER_4, (0.0, 3.0), "limits are 0 and 3, between which a plant with an integ"),
-        (integrator(1.0), sinusoid(1.0, 0.0, 0.0, 1.0), 1.0, "a slowest one above 0"),
+        (integrator(1.0), sinusoid(1.0, 0.0, 0.0, 1.0), 1.0, "a constant alone"),
+        (PlantModel(2.0, (), (), 0.0, 0, (), (4.0,)), sinusoid(3.0, 0.0, 1.57), 1.0, "control, of size 1.5, allow"),
         (integrator(1.0), Reference((1.0, 1.0), (2.0, 3.0), (0.0, 0.0), 0.0), 1.0, "frequencies 2, 3 rad/s"),
         (integrator(1.0), CHAPTER_4, 0.0, "the saturation limit is 0; expected a positive number"),
         (integrator(1.0), CHAPTER_4, math.inf, "limits are -inf and inf; expected finite ones"),
@@ -267,6 +268,16 @@ def test_an_actuator_of_one_sign_on_a_plant_that_follows_at_once() -> None:
         holds(periodic_limit(lag, reference, limits), exact, 0.01)
     mirrored = sinusoid(-3.0, 1.0, 0.0, -1.0)
     assert periodic_limit(lag, mirrored, (-2.0, 1.5)).lower == pytest.approx(1.0, rel=0.01)
+
+
+def test_two_integrators_with_a_zero_in_the_right_half_plane_have_a_floor() -> None:
+    """No program of this plant under such limits was solved by the simplex nor by the interior points of HiGHS."""
+    plant = PlantModel(1.0, (), (), 0.1, 2, (-5.0,), (10.0, 8.0))
+    rest = RestLimit(plant, sinusoid(1.0, 0.1 * math.pi), 1.0, 40)
+    first, last = rest.at(0), rest.at(rest.last)
+    assert last.upper < 1e-3
+    assert 0.19 < first.lower <= first.upper < 0.21
+    assert first.upper - first.lower < 0.01
 
 
 @pytest.mark.parametrize("band", [0.0, math.nan])
