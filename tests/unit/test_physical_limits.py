@@ -271,7 +271,7 @@ def test_an_actuator_of_one_sign_on_a_plant_that_follows_at_once() -> None:
 
 
 def test_two_integrators_with_a_zero_in_the_right_half_plane_have_a_floor() -> None:
-    """No program of this plant under such limits was solved by the simplex nor by the interior points of HiGHS."""
+    """HiGHS leaves programs of this plant unsolved, by its simplex and by its interior points."""
     plant = PlantModel(1.0, (), (), 0.1, 2, (-5.0,), (10.0, 8.0))
     rest = RestLimit(plant, sinusoid(1.0, 0.1 * math.pi), 1.0, 40)
     first, last = rest.at(0), rest.at(rest.last)
