@@ -112,6 +112,7 @@ def delay_free(
         f"\n  C hides {'the integrator' if hidden == 1 else 'both integrators'} of the plant: y drifts under a "
         "constant disturbance at its input; --integral-action prevents that"
     )
+    late = _on_the_plant_with_its_dead_time(design)
     unstable = "" if design.blocks["K"].is_stable else "; K itself is UNSTABLE and diverges when the actuator saturates"
     _finish(
         design,
@@ -119,7 +120,7 @@ def delay_free(
         output,
         f"H-infinity stabiliser: ||[W1 S; W2 T]|| = {upper_end(hinf.gamma, 4)}, no stabilising controller below "
         f"{lower_end(hinf.gamma_lower, 4)}; every closed-loop pole left of -{lower_end(hinf.decay_rate, 4)} 1/s"
-        f"{unstable}{drift if hidden else ''}",
+        f"{unstable}{drift if hidden else ''}{late}",
     )
 
 
@@ -273,6 +274,23 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
         stable = "stable" if judged.theta2_stable else "NOT stable: a lasting offset after saturation"
         click.echo(f"  anti-windup {name:9s} f = {judged.f:.4g}, Popov sector {sector}, theta2 {stable}")
     click.echo(f"  guarantee of the corrected one: {design.corrected.guarantee}, {design.corrected.guarantee_said}")
+
+
+def _on_the_plant_with_its_dead_time(design: Design) -> str:
+    """What a design that ignores the dead time must not be taken for."""
+    from design.stability.characteristic_roots import roots_right_of
+    from design.stability.margins import delay_loop
+
+    delay_s = design.plant.delay_s
+    if not delay_s:
+        return ""
+    count = roots_right_of(delay_loop(design, design.plant), 0.0)
+    if not count:
+        return f"\n  stable on the plant with its dead time of {delay_s:g} s too; its runs leave the dead time out"
+    return (
+        f"\n  UNSTABLE on the plant with its dead time of {delay_s:g} s, with {count} roots in the right half plane: "
+        "design extended is for it"
+    )
 
 
 def _compared(design: Design) -> str:

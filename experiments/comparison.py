@@ -103,7 +103,10 @@ def comparison_tables(
     unsaturated = simulate(loops["none"], (-np.inf, np.inf), time_s).outputs["output"]
     runs: dict[str, Run] = {}
     for name, loop in loops.items():
-        runs |= run_all({name: loop}, limit, time_s)
+        try:
+            runs |= run_all({name: loop}, limit, time_s)
+        except InputError as error:
+            refused[name] = str(error)
         tick()
     from_s, least = _least_error(true, reference, limit, period)
     rows = []

@@ -117,6 +117,8 @@ def from_one_plus(one_plus: Block) -> AntiWindup:
 
 
 def _require_strictly_proper_and_stable(theta1_tilde: Block) -> None:
+    if theta1_tilde.gain == 0 and not theta1_tilde.poles:
+        return
     if theta1_tilde.relative_degree < 1 or not theta1_tilde.is_stable or theta1_tilde.delay_s:
         raise InputError(
             f"theta1~ has {len(theta1_tilde.zeros)} zeros and the poles "

@@ -48,7 +48,7 @@ class Judgement:
         output's unit; None when y_d grows without bound.
     recovery_s
         Time in seconds in which the slowest mode of theta1~ falls to 1 %; what is left of y_d then decays with the
-        plant's own modes.
+        plant's own modes. Of theta1~ = 0 that of the plant's slowest mode.
     """
 
     f: float
@@ -170,7 +170,7 @@ def judge(plant: PlantModel, bound: AdditiveBound, kind: AntiWindup) -> Judgemen
         theta1_tilde_at_zero=float(kind.theta1_tilde(0j).real),
         theta2_stable=kind.theta2(plant).is_stable,
         lasting_offset=lasting_offset(plant, kind),
-        recovery_s=settling_of_slowest(kind.one_plus),
+        recovery_s=settling_of_slowest(kind.one_plus if kind.one_plus.poles else plant_block(plant)),
     )
 
 

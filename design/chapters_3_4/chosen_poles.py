@@ -112,7 +112,7 @@ def chosen_pace(
     """
     fastest = fastest_root(plant_block(plant), bound_block(bound))
     beyond = min(fastest, highest_omega or fastest)
-    known = f"the highest line, {beyond:.4g} rad/s" if highest_omega else f"the fastest root, {beyond:.4g} rad/s"
+    known = f"the {'fastest root' if beyond == fastest else 'highest line'}, {beyond:.4g} rad/s"
     if wanted.omegas:
         top, why = AHEAD * max(wanted.omegas), "ten times the fastest sinusoid of the reference"
         if top > beyond:

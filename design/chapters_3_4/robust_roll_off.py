@@ -203,12 +203,12 @@ def _known(plant: PlantModel, bound: AdditiveBound, level: float, band: tuple[fl
     starts, ends = np.flatnonzero(np.diff(below.astype(int)) == 1), np.flatnonzero(np.diff(below.astype(int)) == -1) - 1
     if not len(starts):
         measured = " where it was measured" if band[1] < np.inf else ""
-        return f"a tighter W_a, by more poles of it or more alike tests (|W_a/P| is below {level:g} nowhere{measured})"
+        return f"a tighter W_a, by more poles of it or more alike tests (|W_a/P| is below the level nowhere{measured})"
     widest = int(np.argmax(omega[ends] / omega[starts]))
     low, high = omega[starts[widest]], omega[ends[widest]]
     return (
-        f"a frequency at which the model is better known, such as {low:.4g} to {high:.4g} rad/s, or a tighter W_a, by "
-        "more poles of it or more alike tests"
+        "a tighter W_a, by more poles of it or more alike tests, or another frequency (|W_a/P| is below the level from "
+        f"{low:.4g} to {high:.4g} rad/s)"
     )
 
 

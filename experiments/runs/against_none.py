@@ -36,7 +36,7 @@ class Outcome:
     ----------
     recovery_s
         The last time at which y is farther than :data:`BAND` of the amplitude from the run without limits; infinite
-        where it still is at the end, or the run diverges.
+        where it still is in the last period, or the run diverges.
     last_error
         The largest distance of y from it in the last period, over the amplitude.
     largest_control
@@ -89,21 +89,24 @@ class Comparison:
 
     def _sentence(self, name: str) -> str:
         own, none = self.outcomes[name], self.outcomes["none"]
-        times = [self._recovers(each) for each in (own, none)]
-        errors = [_percent(each.last_error) for each in (own, none)]
+        did = [self._did(each) for each in (own, none)]
         worse = "WORSE" if self.is_worse(name) else "no worse"
         return (
-            f"{name} is {worse} than no anti-windup under the limits {self._limits}: it recovers {times[0]} "
-            f"(none {times[1]}), is {errors[0]} off in the last period (none {errors[1]}), "
-            f"and |u| reaches {own.largest_control:.3g} times the limit (none {none.largest_control:.3g})"
+            f"{name} is {worse} than no anti-windup under the limits {self._limits}, from rest under a reference that "
+            f"begins at its crest: it {did[0]}; none {did[1]}"
         )
 
-    def _recovers(self, outcome: Outcome) -> str:
+    def _did(self, outcome: Outcome) -> str:
+        """What a run does: recovered is y within BAND of what it is without limits, off how far it is from that."""
+        if math.isinf(outcome.last_error):
+            return "diverges"
+        recovers = f"recovers after {outcome.recovery_s:.3g} s"
         if outcome.recovery_s == 0:
-            return "at once"
+            recovers = "recovers at once"
         if math.isinf(outcome.recovery_s):
-            return f"not within {self.until_s:.3g} s"
-        return f"after {outcome.recovery_s:.3g} s"
+            recovers = f"does not recover within {self.until_s:.3g} s"
+        off = f"{_percent(outcome.last_error)} off the loop without limits in the last period"
+        return f"{recovers}, is {off}, and |u| reaches {outcome.largest_control:.3g} times the limit"
 
 
 def against_none(
@@ -174,7 +177,7 @@ def _outcome(
     beyond = np.flatnonzero(off > BAND)
     end = float(times[beyond[-1]]) if len(beyond) else 0.0
     return Outcome(
-        recovery_s=math.inf if end == times[-1] else end,
+        recovery_s=math.inf if end > times[-1] - period else end,
         last_error=float(off[times >= times[-1] - period].max()),
         largest_control=float(np.abs(control).max()) / max(-limits[0], limits[1]),
     )
