@@ -156,7 +156,7 @@ def test_without_integral_action_where_the_model_is_not_known_at_rest() -> None:
     assert any("no integral action" in reason for reason in design.free.reasons)
     assert complex(design.blocks["T_so"](3j) * design.blocks["T_si"](3j)) == pytest.approx(1.0, rel=1e-9)
     with pytest.raises(
-        InputError, match=r"\|W_a/P\| is 0.8 at 0 rad/s.*a level above that, or a frequency .*better known"
+        InputError, match=r"\|W_a/P\| is 0.8 at 0 rad/s.*a level above that, or a tighter W_a, .*another frequency"
     ):
         design_extended(IdentifiedModel(plant, bound), [0.0, 3.0])
 
