@@ -70,7 +70,7 @@ class Reference:
             for value in values:
                 if not math.isfinite(value) or (name == "frequency" and value < 0):
                     raise InputError(
-                        f"a {name} of the reference is {value:g}; expected a finite number, no frequency < 0"
+                        f"the reference has the {name} {value:g}; expected finite numbers, and no frequency below 0"
                     )
 
     def __call__(self, time_s: np.ndarray) -> np.ndarray:
