@@ -12,7 +12,7 @@ if __name__ == "__main__":
 
 import re
 from dataclasses import replace
-from math import isfinite
+from math import isfinite, tau
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -170,8 +170,6 @@ def extended(
 
     With --reference-hz 0.5 alone the rest is chosen from the reference, the dead time and W_a, and said.
     """
-    from math import tau
-
     from design.asked_model import asked_model
     from design.chapters_3_4.design_extended import design_extended
 
@@ -277,20 +275,14 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
 
 
 def _on_the_plant_with_its_dead_time(design: Design) -> str:
-    """What a design that ignores the dead time must not be taken for."""
     from design.stability.characteristic_roots import roots_right_of
     from design.stability.margins import delay_loop
 
-    delay_s = design.plant.delay_s
-    if not delay_s:
+    if not design.plant.delay_s:
         return ""
     count = roots_right_of(delay_loop(design, design.plant), 0.0)
-    if not count:
-        return f"\n  stable on the plant with its dead time of {delay_s:g} s too; its runs leave the dead time out"
-    return (
-        f"\n  UNSTABLE on the plant with its dead time of {delay_s:g} s, with {count} roots in the right half plane: "
-        "design extended is for it"
-    )
+    found = f"UNSTABLE, {count} roots in the right half plane: design extended is for it" if count else "stable too"
+    return f"\n  on the plant with its dead time of {design.plant.delay_s:g} s, which no run here has: {found}"
 
 
 def _compared(design: Design) -> str:
