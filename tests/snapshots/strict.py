@@ -113,7 +113,7 @@ def _require_finite(name: str, values: np.ndarray, where: str) -> None:
 
 
 def flagged(name: str, values: Any) -> dict[str, np.ndarray]:
-    """A column as the fixture takes it: empty cells become zeros, or the name "-", with a flag beside them."""
+    """A column as the fixture takes it: empty and infinite cells become zeros, or the name "-", with a flag beside."""
     values = np.ma.filled(values, np.nan) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
     if values.dtype.kind in "OT":
         empty = np.asarray(pd.isna(values))
@@ -121,21 +121,26 @@ def flagged(name: str, values: Any) -> dict[str, np.ndarray]:
         return {f"{name}.is_empty": empty.astype(int), name: names} if empty.any() else {name: names}
     if values.dtype.kind == "b":
         return {name: values.astype(int)}
+    if values.dtype.kind == "f" and np.isinf(values).any():
+        infinite = np.isinf(values)
+        signs = np.where(infinite, np.sign(values), 0.0).astype(int)
+        return {f"{name}.is_infinite": signs} | flagged(name, np.where(infinite, 0.0, values))
     if values.dtype.kind != "f" or not np.isnan(values).any():
         return {name: values}
     return {f"{name}.is_empty": np.isnan(values).astype(int), name: np.nan_to_num(values, nan=0.0)}
 
 
 def table_of(columns: Columns) -> pd.DataFrame:
-    """The table whose columns these are, its empty cells empty again."""
-    flags = {name.removesuffix(".is_empty"): values for name, values in columns.items() if name.endswith(".is_empty")}
-    return pd.DataFrame(
-        {
-            name: pd.Series(values).mask(flags[name] == 1) if name in flags else values
-            for name, values in columns.items()
-            if not name.endswith(".is_empty")
-        }
-    )
+    """The table whose columns these are, its empty cells empty again and its infinite ones infinite."""
+    kept = {}
+    for name, values in columns.items():
+        if name.endswith((".is_empty", ".is_infinite")):
+            continue
+        column, signs, empty = pd.Series(values), columns.get(f"{name}.is_infinite"), columns.get(f"{name}.is_empty")
+        if signs is not None:
+            column = column.mask(signs != 0, np.copysign(np.inf, signs))
+        kept[name] = column if empty is None else column.mask(empty == 1)
+    return pd.DataFrame(kept)
 
 
 def readable(columns: Columns) -> dict[str, np.ndarray]:
