@@ -162,11 +162,19 @@ def _rolled_off(
             f"e = {e:.4g} rad/s, f = {f:.4g} rad^2/s^2: poles of real part -a, no slower than the sinusoid"
             for e, f in pairs
         ]
-    found = robust_outer_part(plant, bound, wanted, a, fixed_poles(wanted, a, pairs), level, order, most)
-    poles = "one pole" if found.order == 1 else f"{found.order} poles"
+    poles = fixed_poles(wanted, a, pairs)
+    try:
+        found = robust_outer_part(plant, bound, wanted, a, poles, level, order, most)
+    except InputError:
+        if most == np.inf:
+            raise
+        most = np.inf  # which the choice saw on a coarse grid alone
+        found = robust_outer_part(plant, bound, wanted, a, poles, level, order)
+        reasons.append(f"||S|| is {found.sensitivity:.3g} all the same: no roll-off that was tried keeps it")
+    count = "one pole" if found.order == 1 else f"{found.order} poles"
     calm = f" and ||S|| <= {most:g}" if most < np.inf else ""
     reasons.append(
-        f"T_so rolls off with {poles} at {found.rate:.4g} rad/s: the latest found with |W_a C S| <= {level:g}{calm}"
+        f"T_so rolls off with {count} at {found.rate:.4g} rad/s: the latest found with |W_a C S| <= {level:g}{calm}"
         if found.order
         else f"T_so needs no roll-off: |W_a C S| is at most {found.peak:.3g} <= {level:g} as it is"
     )

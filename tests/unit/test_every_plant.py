@@ -224,3 +224,19 @@ def test_pades_approximation_of_a_plant_that_jumps_with_its_input_tends_to_its_d
     ]
     assert apart[0] > 2 * apart[1] > 2.5 * apart[2]
     assert apart[2] < 1e-3
+
+
+@pytest.mark.parametrize("seed", [1002, 1149])
+def test_where_the_fine_grid_shows_more_than_the_coarse_one_the_design_says_so(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    plant = random_plant(random)
+    slowest = min(abs(root) for root in plant_block(plant).poles if root)
+    omega = slowest * 10.0 ** random.uniform(-0.7, 0.3)
+    omegas = [omega] if random.random() < 0.6 else [omega, 2.7 * omega]
+    omegas = [0.0, *omegas] if random.random() < 0.15 else omegas
+    bound = bound_of(plant, omega, 10.0 ** random.uniform(-3, -0.8))
+    design = design_extended(IdentifiedModel(plant, bound), omegas)
+    said = next(reason for reason in design.free.reasons if "all the same" in reason)
+    T_so, T_si = design.blocks["T_so"], design.blocks["T_si"]
+    s = 1j * omega * np.geomspace(1e-2, 1e3, 200_001)
+    assert np.abs(1 - T_so(s) * T_si(s)).max() == pytest.approx(float(said.split()[2]), rel=0.01)
