@@ -163,13 +163,9 @@ def _rolled_off(
             for e, f in pairs
         ]
     poles = fixed_poles(wanted, a, pairs)
-    try:
-        found = robust_outer_part(plant, bound, wanted, a, poles, level, order, most)
-    except InputError:
-        if most == np.inf:
-            raise
-        most = np.inf  # which the choice saw on a coarse grid alone
-        found = robust_outer_part(plant, bound, wanted, a, poles, level, order)
+    found = robust_outer_part(plant, bound, wanted, a, poles, level, order, most)
+    if found.sensitivity > most:  # which the choice saw on a coarse grid alone
+        most = np.inf
         reasons.append(f"||S|| is {found.sensitivity:.3g} all the same: no roll-off that was tried keeps it")
     count = "one pole" if found.order == 1 else f"{found.order} poles"
     calm = f" and ||S|| <= {most:g}" if most < np.inf else ""

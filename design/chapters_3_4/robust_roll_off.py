@@ -122,7 +122,7 @@ def robust_outer_part(
     order
         Of the roll-off; every one from the least to MOST_POLES more unless given.
     most
-        That ||S|| is to be, as far as a search on a refined grid shows.
+        What ||S|| is to be at most, as far as a search on a refined grid shows, where a roll-off that is tried has it.
 
     Raises
     ------
@@ -155,15 +155,14 @@ def robust_outer_part(
         best = min(best, float(seen.min()))
         for calm in (np.inf, most)[: 1 + (most < np.inf)]:  # the latest that meets the level is the calmest, mostly
             found = _latest_of(loop, tried, np.flatnonzero(seen <= limit), order, limit, calm)
-            proved = [] if found is None else _proved(plant, bound, loop, found, order, limit)
+            proved = [] if found is None else _proved(loop, found, order, limit)
+            met += proved
             if proved and proved[0].sensitivity <= most:
-                met += proved
                 break
     if met:
         return min(met, key=lambda redesign: redesign.sensitivity)
-    beside = f" with ||S|| <= {most:g}" if most < np.inf else ""
     raise InputError(
-        f"no roll-off tried, of up to {orders[-1]} poles, brings ||W_a C S|| below {best:.4g}{beside}, the level is "
+        f"no roll-off tried, of up to {orders[-1]} poles, brings ||W_a C S|| below {best:.4g}, the level is "
         f"{level:g}; expected a slower a, e and f (no controller gets below {floor:.4g})"
     )
 
@@ -212,14 +211,11 @@ def _known(plant: PlantModel, bound: AdditiveBound, level: float, band: tuple[fl
     )
 
 
-def _proved(
-    plant: PlantModel, bound: AdditiveBound, loop: Loop, rate: float, order: int, limit: float
-) -> list[Redesign]:
+def _proved(loop: Loop, rate: float, order: int, limit: float) -> list[Redesign]:
     """The design with this rate, or one lower by up to STEPS thousandths, whose level is proved; else none."""
-    inverse = inner_outer(plant)[1].inverse()
     for _ in range(STEPS):
         T_so = outer_part(loop.wanted, (*loop.poles, *(complex(-rate),) * order))
-        norm, _ = block_norm(bound_block(bound) * (T_so * inverse))
+        norm, _ = block_norm(loop.per_T_so * T_so)
         if norm <= limit:
             return [Redesign(T_so, rate, order, norm, loop.peak(loop.sensitivity, rate, order))]
         rate *= 1 - 1e-3

@@ -14,7 +14,7 @@ from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import DivergenceError, Run, limit_pair, simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference
-from experiments.runs.region import GROWTH, require_within_region
+from experiments.runs.region import longest_run, require_within_region
 from experiments.runs.sector_promise import finely
 from experiments.runs.simulate_design import SAMPLES
 from identification.base.errors import InputError
@@ -153,8 +153,7 @@ def _length(design: Design, reference: Reference) -> tuple[float, float]:
     period = reference.period_s if math.isfinite(reference.period_s) else recovery
     blocks = (plant_block(design.loop_plant), *design.controller_parts(), design.corrected.kind.one_plus)
     most = STEPS * STEP / fastest_root(*blocks)
-    unstable = max((pole.real for pole in design.loop_plant.unstable_poles), default=0.0)
-    until = min(max(PERIODS * period, 3 * recovery), most, GROWTH / unstable if unstable else math.inf)
+    until = min(max(PERIODS * period, 3 * recovery), most, longest_run(design.loop_plant))
     if until < period:
         why = "the plant's unstable pole" if until < most else "the loop's fastest root"
         raise InputError(f"a period of the reference is {period:.4g} s, and {why} lets a run last {until:.4g} s")

@@ -62,6 +62,12 @@ def require_within_region(
             )
 
 
+def longest_run(plant: PlantModel) -> float:
+    """The time in seconds within which the rounding of a run with an unstable pole does not show; else infinite."""
+    fastest = max((pole.real for pole in plant.unstable_poles), default=0.0)
+    return GROWTH / fastest if fastest else math.inf
+
+
 def require_short(plant: PlantModel, until_s: float) -> None:
     """Refuse a run in which the engine's own rounding, which grows like exp(p t) with an unstable pole, would show.
 
@@ -70,11 +76,12 @@ def require_short(plant: PlantModel, until_s: float) -> None:
     InputError
         The run is longer than :data:`GROWTH` time constants of the plant's fastest unstable pole.
     """
-    fastest = max((pole.real for pole in plant.unstable_poles), default=0.0)
-    if fastest * until_s > GROWTH:
+    longest = longest_run(plant)
+    if until_s > longest:
+        fastest = GROWTH / longest
         raise InputError(
             f"the run lasts {until_s:g} s; the plant has a pole at {fastest:.4g} rad/s in the right half plane, with "
-            f"which the engine's rounding grows like exp({fastest:.4g} t), so that {GROWTH / fastest:.4g} s are "
+            f"which the engine's rounding grows like exp({fastest:.4g} t), so that {longest:.4g} s are "
             "expected at most, or the sampled controller, which has no such mode"
         )
 
