@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 
 import numpy as np
 import pandas as pd
 
 from design.blocks.block import fastest_root
-from design.design_file import Asked, Design
+from design.design_file import Design
 from experiments.drive.difference_equations import METHODS
 from experiments.drive.sampled_loop import Drive, simulate_sampled
 from experiments.engine.simulate import DivergenceError
@@ -75,9 +75,7 @@ def rates_tables(
             | numbers_of(time_s, run.outputs["error"], period, reference)
         )
         tick()
-    drives = [
-        Drive(each, method, limits, quantum, rate_limit, input_delay_s) for method in METHODS for each in rates
-    ]
+    drives = [Drive(each, method, limits, quantum, rate_limit, input_delay_s) for method in METHODS for each in rates]
     for name in NAMES:
         rows += rows_of(design, reference, name, drives, time_s[-1], period, tick=tick)
     facts = {"asked_hz": rate or math.nan, "amplitude": reference.amplitude, "quantum": quantum, **low_high}

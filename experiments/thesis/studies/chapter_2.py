@@ -59,5 +59,5 @@ def as_thesis(summary: pd.DataFrame, table: pd.DataFrame, limit_is_given: bool) 
     peaks = [float(np.abs(after[f"error_{run}"].to_numpy()).max()) if len(after) else np.nan for run in summary["run"]]
     found = summary.loc[:, :"covered"].drop(columns="lower_limit")
     found.insert(2, "limit_is_given", int(limit_is_given))
-    found.insert(found.columns.get_loc("ripple") + 1, "peak_error_after_1s", peaks)  # type: ignore[arg-type]
+    found.insert(list(found).index("ripple") + 1, "peak_error_after_1s", peaks)
     return found
