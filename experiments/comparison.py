@@ -77,8 +77,9 @@ def comparison_tables(
             betters; the last for the start only, and for a periodic reference.
         largest_control, last_error
             The greatest |u| over the larger limit, and the greatest |r - y| of the last period.
-        lower_limit, limit, required
-            The second is the upper limit, the last the most that the control of perfect tracking reaches.
+        lower_limit, limit, amplitude, required
+            The second is the upper limit, the third the sum of the reference's amplitudes, the last the most that the
+            control of perfect tracking reaches.
 
         ``compare_runs``: time_s, reference, output_unsaturated, and for every run NAME output_NAME and control_NAME.
 
@@ -114,7 +115,7 @@ def comparison_tables(
     rows = []
     for name in ("none", *design.anti_windup, *OTHERS):
         known: dict[str, object] = {"lower_limit": low, "limit": high, "required": required}
-        known |= {"refused": refused.get(name)}
+        known |= {"amplitude": reference.amplitude, "refused": refused.get(name)}
         if name in kinds:
             known |= _promised(design, kinds[name], true)
         for upset, start_s in (("start", 0.0), ("pulse", begin)):

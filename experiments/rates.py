@@ -133,3 +133,28 @@ def numbers_of(time_s: np.ndarray, error: np.ndarray, span_s: float, reference: 
         "steady_error": abs(offset) + ripple,
         "settling_s": settling_time(time_s, error - offset, SETTLED * reference.amplitude),
     }
+
+
+def lowest_rate(table: pd.DataFrame, run: str, method: str) -> float:
+    """The lowest rate in Hz from which on, as far as was tried, a computer does what continuous time does.
+
+    Parameters
+    ----------
+    table
+        See :func:`rates_tables`.
+    run, method
+        Which rows.
+
+    Returns
+    -------
+    float
+        At it and at all higher rates of the table the steady error is less than that in continuous time and 1 % of the
+        reference's amplitude; NaN where there is none.
+    """
+    own = table[table["run"] == run]
+    least = float(own["steady_error"][own["method"] == "continuous"].iloc[0])
+    rows = own[own["method"] == method].sort_values("rate_hz")
+    near = (rows["steady_error"] <= least + SETTLED * rows["amplitude"]).to_numpy()
+    beyond = np.flatnonzero(~near)
+    first = beyond[-1] + 1 if len(beyond) else 0
+    return float(rows["rate_hz"].iloc[first]) if first < len(rows) else math.nan

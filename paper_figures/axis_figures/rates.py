@@ -1,0 +1,111 @@
+"""What becomes of the loop on a computer: its steady error over the sampling rate, by method."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from design.design_file import Design
+from experiments.rates import NAMES, lowest_rate
+from experiments.runs.compare_anti_windups import SETTLED
+from paper_figures.axis_figures.labels import KINDS, limits_said, look_of, united, with_unit
+from paper_figures.look import panels
+from paper_figures.look.captions import only, sampling_rate
+from paper_figures.look.style import FULL_WIDTH, LINES, figure, styled
+
+TABLES: tuple[str, ...] = ("rates",)
+
+CONTINUOUS = "continuous"
+METHODS = {"tustin": ("Tustin's rule", "o"), "exact": ("held inputs", "s")}
+MARKER = 3.5
+DECADES = 6
+DIVERGENT = 100.0  # times the reference's amplitude is not shown
+
+
+def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
+    """Return the caption with the numbers of the tables."""
+    table, signals = tables["rates"], design.signals
+    band = with_unit(SETTLED * only(table, "amplitude"), signals.output_unit)
+    said = " ".join(_said(table, method, words) for method, (words, _) in METHODS.items())
+    levels = only(table, "quantum")
+    steps = f" in steps of {with_unit(levels, signals.input_unit)}" if levels else ""
+    return (
+        f"The controller on a computer, under the limits {limits_said(table, signals.input_unit)}{steps}: the greatest "
+        "error of the last period over the sampling rate, its blocks discretised by Tustin's rule (circles) or as they "
+        f"answer an input that is held for a sample (squares); broad, in continuous time; dotted, {band}, which is 1 % "
+        f"of the reference's amplitude. With the corrected anti-windup: {said}{_divergent(table)}"
+    )
+
+
+def _said(table: pd.DataFrame, method: str, words: str) -> str:
+    rate = lowest_rate(table, "corrected", method)
+    if math.isnan(rate):
+        return f"{words} do not come within 1 % of the error in continuous time at any of these rates."
+    return f"{words}, from {sampling_rate(rate)} on within 1 % of the error in continuous time."
+
+
+def _divergent(table: pd.DataFrame) -> str:
+    """Which of the runs on a computer are not there because they diverge."""
+    gone = table[table["steady_error"].isna() & table["rate_hz"].notna()]
+    rows = ((str(row.run), str(row.method), float(str(row.rate_hz))) for row in gone.itertuples())
+    said = [f"{KINDS.get(run, run)}, {METHODS[method][0]}, {sampling_rate(rate)}" for run, method, rate in rows]
+    return f" Not drawn, since it diverges: {'; '.join(said)}." if said else ""
+
+
+@styled()
+def draw(design: Design, tables: Mapping[str, pd.DataFrame]) -> Figure:
+    """Return the figure."""
+    table = tables["rates"]
+    panel = figure(FULL_WIDTH, 3.2).subplots()
+    over_rate(panel, table, NAMES)
+    for run in NAMES:
+        panel.plot([], [], **LINES[look_of(run)], label=KINDS[run])
+    panel.axhline(SETTLED * only(table, "amplitude"), **LINES["saturation limits"])
+    asked = only(table, "asked_hz")
+    if not math.isnan(asked):
+        panel.axvline(asked, **LINES["reference"], label="the computer's rate")
+    panel.set_ylabel(united("Greatest error, last period", design.signals.output_unit))
+    known = table["steady_error"].dropna()
+    known = known[(known > 0) & (known < DIVERGENT * only(table, "amplitude"))]
+    if len(known):
+        top = 2 * max(float(known.max()), SETTLED * only(table, "amplitude"))
+        panel.set_ylim(max(float(known.min()) / 2, top / 10**DECADES), top)
+    panel.legend(**panels.ABOVE, ncols=len(panel.get_legend_handles_labels()[1]))
+    found = panel.get_figure(root=True)
+    assert found is not None
+    return found
+
+
+def over_rate(panel: Axes, table: pd.DataFrame, runs: Sequence[str]) -> None:
+    """Draw the error of the last period: a line a run and a marker a method; broad, in continuous time.
+
+    Parameters
+    ----------
+    panel
+        Where to draw.
+    table
+        With the columns run, method (continuous, tustin, exact), rate_hz and steady_error.
+    runs
+        Those that are drawn, the last one upon the others.
+    """
+    ends = (table["rate_hz"].min(), table["rate_hz"].max())
+    for order, run in enumerate(runs):
+        line = LINES[look_of(run)]
+        own = table[table["run"] == run]
+        panel.plot(ends, [float(own["steady_error"][own["method"] == CONTINUOUS].iloc[0])] * 2, **panels.band(line))
+        for method, (_, marker) in METHODS.items():
+            rows = own[own["method"] == method]
+            face = line["color"] if method == "tustin" else "#FFFFFF"
+            look = line | {"marker": marker, "markersize": MARKER, "markerfacecolor": face, "zorder": 3 + order}
+            panel.plot(rows["rate_hz"], rows["steady_error"], **look)
+    for method, (label, marker) in METHODS.items():
+        face = "#000000" if method == "tustin" else "#FFFFFF"
+        look = {"color": "#000000", "linestyle": "none", "marker": marker, "markersize": MARKER}
+        panel.plot([], [], **look, markerfacecolor=face, label=label)
+    panel.set(xscale="log", xlabel="Sampling rate [Hz]", yscale="log")
+    panel.xaxis.set_minor_formatter(NullFormatter())
