@@ -9,8 +9,13 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from experiments.runs.guarantee import sector_text
+<<<<<<< HEAD
 from paper_figures.axis_figures.campaign import UNSURE, band, distributions
 from paper_figures.look.captions import number, of_run, only
+=======
+from paper_figures.look import panels
+from paper_figures.look.captions import number, of_limits, of_run, only
+>>>>>>> wt18-plots
 from paper_figures.look.panels import CORRECTED, NONE, THESIS
 from paper_figures.look.style import styled
 
@@ -27,13 +32,14 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     return (
         "What the anti-windup does over the plants that W_a admits (not in the thesis). SYNTHETIC: "
         f"{plants} plants that we drew (seed {int(only(summary, 'seed'))}), each in the loop of the same design, under "
-        f"the limits +-{number(only(summary, 'limit'))}, for {number(only(summary, 'horizon_s'))} s of the thesis's "
+        f"the limits {of_limits(summary)}, for {number(only(summary, 'horizon_s'))} s of the thesis's "
         f"reference. {_promised(summary)} How they lie within W_a is a choice of ours, so the shares are no "
         "probabilities of a real plant. "
         "(a) to (c) The share of all the plants whose numbers are no larger: the peak of |e| after a quarter of the "
         "reference's period, the peak of the last period, and the time after which |e| stays within 1 % of the "
         "reference's amplitude. Runs that diverge or do not recover count among all, so a line may end below 1. With "
-        f"{number(100 * (1 - UNSURE))} % confidence more plants would move a line by no more than {number(band(plants), 2)}. "
+        f"{number(100 * (1 - UNSURE))} % confidence more plants would move a line by no more than "
+        f"{number(band(plants), 2)}. "
         f"{_outcomes(summary)}. (d) The shares in each tenth of the distance from the model, the largest "
         f"|P_true - P|/|W_a|: broad grey, the linear loop is stable ({_percent(only(summary, 'linear_stable'))} of "
         "all); coloured, the run recovers."
