@@ -31,6 +31,9 @@ class Step:
         Files of which it reads those that are there.
     is_vital
         Whether a build stops when it refuses, whatever else does not.
+    stages
+        Some of the files that it uses, more in each stage: as soon as those of a stage are there, or refused, it is
+        run on what there is by then; and once more at the end.
     """
 
     name: str
@@ -39,6 +42,7 @@ class Step:
     needs: tuple[Path, ...] = ()
     uses: tuple[Path, ...] = ()
     is_vital: bool = False
+    stages: tuple[tuple[Path, ...], ...] = ()
 
     @property
     def refusal(self) -> Path:
@@ -295,7 +299,8 @@ def _summary(asked: Asked, made: Sequence[Step]) -> Step:
     folder, (tests, files) = asked.folder, asked.tests
     command = ("paper_figures", "summary", "--build", str(folder), "--", asked.chosen, *tests)
     uses = tuple(path for step in made for path in (*step.outputs, step.refusal))
-    return Step("summary", command, _pictures(folder / "summary"), (*asked.model_files, *files), uses, is_vital=True)
+    needs, stages = (*asked.model_files, *files), ((), _csv(folder, "compare"))
+    return Step("summary", command, _pictures(folder / "summary"), needs, uses, is_vital=True, stages=stages)
 
 
 def _campaign_tables(folder: Path) -> Step:

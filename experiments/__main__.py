@@ -15,12 +15,14 @@ from typing import Any
 
 import click
 
+from experiments.axis_command import axis_command
 from experiments.campaign.command import campaign_command
 from experiments.options import DESIGN, OUTPUT_FOLDER, positive_limit, sinusoid_options
 from experiments.pair_options import NumberPair, PairCommand
 from experiments.run_commands import sampled_command, simulate_command
 from experiments.tables import write_into
 from experiments.thesis.commands import thesis
+from identification.base.axis_option import AXIS
 from identification.base.command_line import CommandGroup
 from identification.base.path_types import INPUT_FILE
 
@@ -42,6 +44,7 @@ def main() -> None:
     """Simulate saturated loops, their dead time exact."""
 
 
+main.add_command(axis_command)
 main.add_command(simulate_command)
 main.add_command(sampled_command)
 main.add_command(campaign_command)
@@ -60,6 +63,7 @@ def campaign_distributions(campaign: Path, output: Path) -> None:
 
 @main.command("limits", cls=PairCommand)
 @DESIGN
+@AXIS
 @click.option(
     "--limit",
     "limits",
@@ -86,6 +90,7 @@ def limits(design: Path, limits: tuple[tuple[float, ...], ...], output: Path, **
 
 @main.command("compare")
 @DESIGN
+@AXIS
 @click.option("--limit", type=float, help="Saturation limits +-LIMIT; 1.2 times what the reference needs by default.")
 @sinusoid_options
 @OUTPUT_FOLDER

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from experiments.options import DESIGN, positive_limit, sinusoid_options
+from identification.base.axis_option import AXIS
 from identification.base.command_line import together
 from identification.base.errors import InputError
 from identification.base.path_types import OUTPUT_FILE
@@ -29,6 +30,7 @@ plant_options = together(
 
 @click.command("campaign")
 @plant_options
+@AXIS
 @click.option("--limit", type=float, required=True, help="Saturation limits +-LIMIT.")
 @click.option("--periods", type=int, default=5, help="Length of a run in periods of the reference.")
 @sinusoid_options
