@@ -232,6 +232,7 @@ def _axis_tables(asked: Asked) -> list[Step]:
 
     results = folder / "results"
     return [
+        of_design("tracking", results, _csv(folder, "tracking", "tracking_summary")),
         of_design("compare", results, _csv(folder, "compare", "compare_runs")),
         of_design("rates", results, _csv(folder, "rates", "rates_summary")),
         of_design("limits", results, _csv(folder, "limits_extended", "limits_extended_summary")),
@@ -299,7 +300,7 @@ def _summary(asked: Asked, made: Sequence[Step]) -> Step:
     folder, (tests, files) = asked.folder, asked.tests
     command = ("paper_figures", "summary", "--build", str(folder), "--", asked.chosen, *tests)
     uses = tuple(path for step in made for path in (*step.outputs, step.refusal))
-    needs, stages = (*asked.model_files, *files), ((), _csv(folder, "compare"))
+    needs, stages = (*asked.model_files, *files), ((), _csv(folder, "tracking"))
     return Step("summary", command, _pictures(folder / "summary"), needs, uses, is_vital=True, stages=stages)
 
 

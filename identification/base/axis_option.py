@@ -8,7 +8,8 @@ from typing import Any
 
 import click
 
-from identification.base.axis_file import KEYS, SUPERSEDES, read_axis
+from identification.base.axis_file import KEYS, SINUSOIDS, SUPERSEDES, read_axis
+from identification.base.errors import InputError
 from identification.base.path_types import INPUT_FILE
 
 
@@ -25,6 +26,9 @@ class AxisOption(click.Option):
             for name, param in options.items():
                 for other in SUPERSEDES.get(name, ()) if param.name in opts else ():
                     values.pop(other, None)
+            for name in (*SINUSOIDS, "reference"):
+                if name in values and name not in options and "amplitude" in options:
+                    raise InputError(f"{path}: the reference has a {name}, which {ctx.info_name} does not take")
             ctx.default_map = {str(options[name].name): value for name, value in values.items() if name in options}
             for name in {"limit"} & values.keys() & options.keys():
                 if options[name].multiple:
