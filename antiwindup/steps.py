@@ -31,6 +31,9 @@ class Step:
         Files of which it reads those that are there.
     is_vital
         Whether a build stops when it refuses, whatever else does not.
+    stages
+        Some of the files that it uses, more in each stage: as soon as those of a stage are there, or refused, it is
+        run on what there is by then; and once more at the end.
     """
 
     name: str
@@ -39,6 +42,7 @@ class Step:
     needs: tuple[Path, ...] = ()
     uses: tuple[Path, ...] = ()
     is_vital: bool = False
+    stages: tuple[tuple[Path, ...], ...] = ()
 
     @property
     def refusal(self) -> Path:
@@ -62,8 +66,12 @@ class Asked:
         The files that they mean.
     fit
         Options of ``identification fit``.
+    axis
+        Options of ``experiments axis``: what is known of the user's axis.
+    axis_files
+        The files that these name.
     limit
-        Saturation limits +-limit instead of the thesis's.
+        Saturation limits +-limit instead of the thesis's, where the thesis's figures are drawn.
     plants
         How many plants are drawn within W_a.
     """
@@ -73,6 +81,8 @@ class Asked:
     sweeps: tuple[str, ...]
     sweep_files: tuple[Path, ...]
     fit: tuple[str, ...] = ()
+    axis: tuple[str, ...] = ()
+    axis_files: tuple[Path, ...] = ()
     limit: float | None = None
     plants: int = 200
 
@@ -95,12 +105,9 @@ class Asked:
 
 
 def refit_steps(asked: Asked) -> list[Step]:
-    """Fit, designs, experiments and figures of a plant, and the page that sums them up."""
-    made = [*_fit(asked), *_designs(asked), *_experiments(asked)]
-    drawn = [
-        step for step in _figures(asked.folder) if any(not path.name.startswith(OF_NO_MODEL) for path in step.needs)
-    ]
-    return [*made, *drawn, _summary(asked, made)]
+    """Fit, axis, designs, tables and figures of the user's plant, and the page that sums them up as they come."""
+    made = [*_fit(asked), _axis(asked), *_axis_designs(asked.folder), *_axis_tables(asked)]
+    return [*made, *_axis_figures(asked), _summary(asked, made)]
 
 
 def thesis_steps(asked: Asked) -> list[Step]:
@@ -190,11 +197,74 @@ def _experiments(asked: Asked) -> list[Step]:
         ),
         _tables(folder, "hidden-modes", extended, options=limit),
         Step("campaign", ("experiments", "thesis", "campaign", *plants, "--", str(extended)), (campaign,), (extended,)),
+        _campaign_tables(folder),
+    ]
+
+
+def _axis(asked: Asked) -> Step:
+    """What the user said of the axis, and what follows for the rest from the fitted plant."""
+    folder, model = asked.folder, asked.folder / "model.json"
+    command = ("experiments", "axis", *asked.axis, "--output", str(folder), "--", str(model))
+    return Step("axis", command, (folder / "axis.toml", folder / "axis.csv"), (model, *asked.axis_files))
+
+
+def _axis_designs(folder: Path) -> list[Step]:
+    axis, model = folder / "axis.toml", folder / "model.json"
+    commands = {"design": ("extended",), "design_delay_free": ("delay-free", "--integral-action")}
+    return [
         Step(
-            "campaign-tables",
-            ("experiments", "campaign-tables", "--output", str(folder / "results"), "--", str(campaign)),
-            _csv(folder, "campaign_distance", "campaign", "campaign_summary"),
-            (campaign,),
+            name.replace("_", " "),
+            ("design", *words, "--axis", str(axis), "--output", str(folder / f"{name}.json"), "--", str(model)),
+            (folder / f"{name}.json",),
+            (model, axis),
+        )
+        for name, words in commands.items()
+    ]
+
+
+def _axis_tables(asked: Asked) -> list[Step]:
+    folder, design, axis = asked.folder, asked.folder / "design.json", asked.folder / "axis.toml"
+    campaign = folder / "results" / "campaign.parquet"
+
+    def of_design(name: str, output: Path, outputs: tuple[Path, ...], options: tuple[str, ...] = ()) -> Step:
+        words = ("experiments", name, *options, "--axis", str(axis), "--output", str(output), "--", str(design))
+        return Step(name, words, outputs, (design, axis, *asked.axis_files))
+
+    results = folder / "results"
+    return [
+        of_design("tracking", results, _csv(folder, "tracking", "tracking_summary")),
+        of_design("compare", results, _csv(folder, "compare", "compare_runs")),
+        of_design("rates", results, _csv(folder, "rates", "rates_summary")),
+        of_design("limits", results, _csv(folder, "limits_extended", "limits_extended_summary")),
+        of_design("campaign", campaign, (campaign,), ("--plants", str(asked.plants), "--seed", "1", "--anew")),
+        _campaign_tables(folder),
+    ]
+
+
+AXIS_FIGURES = {
+    "runs": ("axis.csv", "results/compare_runs.csv"),
+    "anti_windups": ("axis.csv", "results/compare.csv"),
+    "rates": ("axis.csv", "results/rates.csv"),
+    "limits": ("axis.csv", "results/limits_extended.csv", "results/limits_extended_summary.csv"),
+    "campaign": ("axis.csv", "results/campaign.csv", "results/campaign_summary.csv", "results/campaign_distance.csv"),
+}
+"""Figures of a refit, and the files below its folder that each is drawn from."""
+
+
+def _axis_figures(asked: Asked) -> list[Step]:
+    """The fit, drawn first; and what each table shows."""
+    folder, (tests, files) = asked.folder, asked.tests
+    bode = ("paper_figures", "bode", "--output", str(folder / "figures"), "--", asked.chosen, *tests)
+    return [
+        Step("bode", bode, _pictures(folder / "figures" / "bode"), (*asked.model_files, *files)),
+        *(
+            Step(
+                f"figure {name}",
+                ("paper_figures", "axis", name, "--build", str(folder), "--output", str(folder / "figures")),
+                _pictures(folder / "figures" / name),
+                (folder / "design.json", *(folder / file for file in needed)),
+            )
+            for name, needed in AXIS_FIGURES.items()
         ),
     ]
 
@@ -219,7 +289,7 @@ def _figures(folder: Path) -> list[Step]:
         Step(
             name,
             ("paper_figures", "draw", name, "--results", str(results), "--output", str(figures)),
-            tuple(figures / f"{name}.{kind}" for kind in ("pdf", "svg", "png", "txt")),
+            _pictures(figures / name),
             _csv(folder, *tables),
         )
         for name, tables in figure_tables().items()
@@ -229,9 +299,23 @@ def _figures(folder: Path) -> list[Step]:
 def _summary(asked: Asked, made: Sequence[Step]) -> Step:
     folder, (tests, files) = asked.folder, asked.tests
     command = ("paper_figures", "summary", "--build", str(folder), "--", asked.chosen, *tests)
-    outputs = tuple(folder / f"summary.{kind}" for kind in ("pdf", "svg", "png", "txt"))
     uses = tuple(path for step in made for path in (*step.outputs, step.refusal))
-    return Step("summary", command, outputs, (*asked.model_files, *files), uses, is_vital=True)
+    needs, stages = (*asked.model_files, *files), ((), _csv(folder, "tracking"))
+    return Step("summary", command, _pictures(folder / "summary"), needs, uses, is_vital=True, stages=stages)
+
+
+def _campaign_tables(folder: Path) -> Step:
+    campaign = folder / "results" / "campaign.parquet"
+    return Step(
+        "campaign-tables",
+        ("experiments", "campaign-tables", "--output", str(folder / "results"), "--", str(campaign)),
+        _csv(folder, "campaign_distance", "campaign", "campaign_summary"),
+        (campaign,),
+    )
+
+
+def _pictures(stem: Path) -> tuple[Path, ...]:
+    return tuple(stem.with_name(f"{stem.name}.{kind}") for kind in ("pdf", "svg", "png", "txt"))
 
 
 def _csv(folder: Path, *names: str) -> tuple[Path, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from paper_figures.look.captions import number, only
+from paper_figures.look.captions import number, of_limits
 from paper_figures.look.frequency_axis import plain
 
 KINDS = {
@@ -46,5 +46,4 @@ def with_unit(value: float, unit: str, digits: int = 3) -> str:
 
 def limits_said(table: pd.DataFrame, unit: str) -> str:
     """The limits of a table in words: ``+-12 A`` or ``-3 to 12 A``."""
-    low, high = (only(table, column) for column in ("lower_limit", "limit"))
-    return f"+-{with_unit(high, unit)}" if low == -high else f"{number(low)} to {with_unit(high, unit)}"
+    return f"{of_limits(table)} {unit}".rstrip()

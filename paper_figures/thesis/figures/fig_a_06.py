@@ -9,13 +9,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from experiments.runs.guarantee import sector_text
-<<<<<<< HEAD
 from paper_figures.axis_figures.campaign import UNSURE, band, distributions
-from paper_figures.look.captions import number, of_run, only
-=======
-from paper_figures.look import panels
 from paper_figures.look.captions import number, of_limits, of_run, only
->>>>>>> wt18-plots
 from paper_figures.look.panels import CORRECTED, NONE, THESIS
 from paper_figures.look.style import styled
 

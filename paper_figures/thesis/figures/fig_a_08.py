@@ -8,18 +8,11 @@ from collections.abc import Mapping
 import pandas as pd
 from matplotlib.figure import Figure
 
-<<<<<<< HEAD
 from paper_figures.axis_figures.anti_windups import comparison
 from paper_figures.axis_figures.labels import KINDS as RUNS
 from paper_figures.axis_figures.labels import look_of
-from paper_figures.look.captions import at_least, number, only
+from paper_figures.look.captions import at_least, number
 from paper_figures.look.style import styled
-=======
-from experiments.runs.compare_anti_windups import SETTLED
-from paper_figures.look import panels
-from paper_figures.look.captions import at_least, number, of_limits
-from paper_figures.look.style import FULL_WIDTH, LINES, styled
->>>>>>> wt18-plots
 
 TABLES: tuple[str, ...] = ("compare", "compare_runs")
 
