@@ -234,7 +234,7 @@ def _axis_tables(asked: Asked) -> list[Step]:
     return [
         of_design("tracking", results, _csv(folder, "tracking", "tracking_summary")),
         of_design("compare", results, _csv(folder, "compare", "compare_runs")),
-        of_design("rates", results, _csv(folder, "rates", "rates_summary")),
+        of_design("rates", results, _csv(folder, "rates")),
         of_design("limits", results, _csv(folder, "limits_extended", "limits_extended_summary")),
         of_design("campaign", campaign, (campaign,), ("--plants", str(asked.plants), "--seed", "1", "--anew")),
         _campaign_tables(folder),
@@ -242,13 +242,15 @@ def _axis_tables(asked: Asked) -> list[Step]:
 
 
 AXIS_FIGURES = {
-    "runs": ("axis.csv", "results/compare_runs.csv"),
-    "anti_windups": ("axis.csv", "results/compare.csv"),
-    "rates": ("axis.csv", "results/rates.csv"),
-    "limits": ("axis.csv", "results/limits_extended.csv", "results/limits_extended_summary.csv"),
-    "campaign": ("axis.csv", "results/campaign.csv", "results/campaign_summary.csv", "results/campaign_distance.csv"),
+    "nyquist": (),
+    "sensitivity": (),
+    "run": ("tracking", "tracking_summary"),
+    "anti_windups": ("compare", "compare_runs"),
+    "rates": ("rates",),
+    "limits": ("limits_extended", "limits_extended_summary"),
+    "campaign": ("campaign", "campaign_summary", "campaign_distance"),
 }
-"""Figures of a refit, and the files below its folder that each is drawn from."""
+"""Figures of a refit, and the tables that each is drawn from, beside the design."""
 
 
 def _axis_figures(asked: Asked) -> list[Step]:
@@ -262,9 +264,9 @@ def _axis_figures(asked: Asked) -> list[Step]:
                 f"figure {name}",
                 ("paper_figures", "axis", name, "--build", str(folder), "--output", str(folder / "figures")),
                 _pictures(folder / "figures" / name),
-                (folder / "design.json", *(folder / file for file in needed)),
+                (folder / "design.json", *_csv(folder, *tables)),
             )
-            for name, needed in AXIS_FIGURES.items()
+            for name, tables in AXIS_FIGURES.items()
         ),
     ]
 

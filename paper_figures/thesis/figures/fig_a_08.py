@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from paper_figures.axis_figures.anti_windups import comparison
 from paper_figures.axis_figures.labels import KINDS as RUNS
 from paper_figures.axis_figures.labels import look_of
-from paper_figures.look.captions import at_least, number
+from paper_figures.look.captions import at_least, number, of_limits
 from paper_figures.look.style import styled
 
 TABLES: tuple[str, ...] = ("compare", "compare_runs")
