@@ -106,8 +106,8 @@ class Asked:
 
 def refit_steps(asked: Asked) -> list[Step]:
     """Fit, axis, designs, tables and figures of the user's plant, and the page that sums them up as they come."""
-    made = [*_fit(asked), _axis(asked), *_axis_designs(asked.folder), *_axis_tables(asked)]
-    return [*made, *_axis_figures(asked), _summary(asked, made)]
+    made = [_axis(asked), *_axis_designs(asked.folder), *_axis_tables(asked)]
+    return [*_fit(asked), _bode(asked), *made, *_axis_figures(asked.folder), _summary(asked, made)]
 
 
 def thesis_steps(asked: Asked) -> list[Step]:
@@ -234,38 +234,33 @@ def _axis_tables(asked: Asked) -> list[Step]:
     return [
         of_design("tracking", results, _csv(folder, "tracking", "tracking_summary")),
         of_design("compare", results, _csv(folder, "compare", "compare_runs")),
-        of_design("rates", results, _csv(folder, "rates", "rates_summary")),
+        of_design("rates", results, _csv(folder, "rates")),
         of_design("limits", results, _csv(folder, "limits_extended", "limits_extended_summary")),
         of_design("campaign", campaign, (campaign,), ("--plants", str(asked.plants), "--seed", "1", "--anew")),
         _campaign_tables(folder),
     ]
 
 
-AXIS_FIGURES = {
-    "runs": ("axis.csv", "results/compare_runs.csv"),
-    "anti_windups": ("axis.csv", "results/compare.csv"),
-    "rates": ("axis.csv", "results/rates.csv"),
-    "limits": ("axis.csv", "results/limits_extended.csv", "results/limits_extended_summary.csv"),
-    "campaign": ("axis.csv", "results/campaign.csv", "results/campaign_summary.csv", "results/campaign_distance.csv"),
-}
+AXIS_FIGURES: dict[str, tuple[str, ...]] = {}
 """Figures of a refit, and the files below its folder that each is drawn from."""
 
 
-def _axis_figures(asked: Asked) -> list[Step]:
-    """The fit, drawn first; and what each table shows."""
-    folder, (tests, files) = asked.folder, asked.tests
-    bode = ("paper_figures", "bode", "--output", str(folder / "figures"), "--", asked.chosen, *tests)
+def _bode(asked: Asked) -> Step:
+    """The fit, drawn."""
+    figures, (tests, files) = asked.folder / "figures", asked.tests
+    command = ("paper_figures", "bode", "--output", str(figures), "--", asked.chosen, *tests)
+    return Step("bode", command, _pictures(figures / "bode"), (*asked.model_files, *files))
+
+
+def _axis_figures(folder: Path) -> list[Step]:
     return [
-        Step("bode", bode, _pictures(folder / "figures" / "bode"), (*asked.model_files, *files)),
-        *(
-            Step(
-                f"figure {name}",
-                ("paper_figures", "axis", name, "--build", str(folder), "--output", str(folder / "figures")),
-                _pictures(folder / "figures" / name),
-                (folder / "design.json", *(folder / file for file in needed)),
-            )
-            for name, needed in AXIS_FIGURES.items()
-        ),
+        Step(
+            f"figure {name}",
+            ("paper_figures", "axis", name, "--build", str(folder), "--output", str(folder / "figures")),
+            _pictures(folder / "figures" / name),
+            (folder / "design.json", *(folder / file for file in needed)),
+        )
+        for name, needed in AXIS_FIGURES.items()
     ]
 
 
