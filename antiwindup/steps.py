@@ -106,8 +106,8 @@ class Asked:
 
 def refit_steps(asked: Asked) -> list[Step]:
     """Fit, axis, designs, tables and figures of the user's plant, and the page that sums them up as they come."""
-    made = [*_fit(asked), _axis(asked), *_axis_designs(asked.folder), *_axis_tables(asked)]
-    return [*made, *_axis_figures(asked), _summary(asked, made)]
+    made = [_axis(asked), *_axis_designs(asked.folder), *_axis_tables(asked)]
+    return [*_fit(asked), _bode(asked), *made, *_axis_figures(asked.folder), _summary(asked, made)]
 
 
 def thesis_steps(asked: Asked) -> list[Step]:
@@ -253,21 +253,22 @@ AXIS_FIGURES = {
 """Figures of a refit, and the tables that each is drawn from, beside the design."""
 
 
-def _axis_figures(asked: Asked) -> list[Step]:
-    """The fit, drawn first; and what each table shows."""
-    folder, (tests, files) = asked.folder, asked.tests
-    bode = ("paper_figures", "bode", "--output", str(folder / "figures"), "--", asked.chosen, *tests)
+def _bode(asked: Asked) -> Step:
+    """The fit, drawn."""
+    figures, (tests, files) = asked.folder / "figures", asked.tests
+    command = ("paper_figures", "bode", "--output", str(figures), "--", asked.chosen, *tests)
+    return Step("bode", command, _pictures(figures / "bode"), (*asked.model_files, *files))
+
+
+def _axis_figures(folder: Path) -> list[Step]:
     return [
-        Step("bode", bode, _pictures(folder / "figures" / "bode"), (*asked.model_files, *files)),
-        *(
-            Step(
-                f"figure {name}",
-                ("paper_figures", "axis", name, "--build", str(folder), "--output", str(folder / "figures")),
-                _pictures(folder / "figures" / name),
-                (folder / "design.json", *_csv(folder, *tables)),
-            )
-            for name, tables in AXIS_FIGURES.items()
-        ),
+        Step(
+            f"figure {name}",
+            ("paper_figures", "axis", name, "--build", str(folder), "--output", str(folder / "figures")),
+            _pictures(folder / "figures" / name),
+            (folder / "design.json", *_csv(folder, *tables)),
+        )
+        for name, tables in AXIS_FIGURES.items()
     ]
 
 
