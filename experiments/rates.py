@@ -13,14 +13,13 @@ from design.design_file import Design
 from experiments.drive.difference_equations import METHODS
 from experiments.drive.sampled_loop import Drive, simulate_sampled
 from experiments.engine.simulate import DivergenceError
-from experiments.runs.compare_anti_windups import SETTLED, loops, run_all, span
+from experiments.runs.compare_anti_windups import SETTLED, loops, run_all, span, usual_periods
 from experiments.runs.metrics import over_last, settling_time
 from experiments.runs.references import Reference
 
 NAMES = ("none", "corrected")
 SAMPLES = (2, 4, 8, 16, 32, 64)  # in a period of the fastest root of the controller
-PERIODS = 6
-ROWS = 2000  # a period, of the run in continuous time
+ROWS = 1000  # a period, of the run in continuous time
 
 Tick = Callable[[], object]
 
@@ -66,7 +65,8 @@ def rates_tables(
         lower_limit and limit (the upper one).
     """
     period, low_high = span(design, reference), dict(zip(("lower_limit", "limit"), limits, strict=True))
-    time_s = np.linspace(0.0, PERIODS * period, PERIODS * ROWS + 1)
+    count = usual_periods(design, reference)
+    time_s = np.linspace(0.0, count * period, count * ROWS + 1)
     rates = sorted({*usual_rates(design).values(), *([rate] if rate else [])})
     rows = []
     for name, run in run_all(loops(design, reference, NAMES), limits, time_s, rate_limit).items():

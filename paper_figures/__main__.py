@@ -57,7 +57,7 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
 )
 @click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write to.")
 def axis_command(names: tuple[str, ...], build: Path, output: Path) -> None:
-    """Draw NAME..., what a refit shows of a design, such as run or rates: as PDF, SVG and PNG with its caption as text."""
+    """Draw NAME..., such as run or rates, of a refit: each as PDF, SVG and PNG with its caption as text."""
     from design.design_file import read_design
     from paper_figures.axis_figures.registry import axis_figure
     from paper_figures.look import style
