@@ -18,7 +18,7 @@ from identification.base.files import write_protected_too
 
 HELP = {"show_default": True, "help_option_names": ["-h", "--help"]}  # of every command
 QUOTED = 80  # characters of a value in a sentence
-WRITTEN = {"output", "page", "build", "responses", "record"}  # options that name what a command writes
+WRITTEN = {"output", "page", "build", "responses", "record", "figure"}  # options that name what a command writes
 EXTRAS = {"dask": "campaign", "distributed": "campaign", "pyarrow": "campaign"}  # of pyproject.toml, by their modules
 
 

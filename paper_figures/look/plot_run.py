@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from experiments.drive.sampled_loop import SampledRun
 from experiments.engine.simulate import Run, limit_pair
@@ -33,6 +34,8 @@ KINDS = {
 """What an anti-windup's runs are called, where that is not its own name."""
 SATURATED: dict[str, Any] = {"facecolor": "#E9DFC6", "edgecolor": "none", "zorder": 0.5}
 THIN = 0.9
+FAR = 1.0  # times the view of the control, within which a limit that it does not reach is shown too
+EDGE = 0.06
 BEYOND = 1.0  # of the range of the limits, up to which u is shown above and below them
 
 
@@ -89,6 +92,8 @@ def plot_run(
         _control(panel, name, run, looks[name], pair)
         panel.set_ylabel(plain(signals.input))
     controls[-1].set_xlabel("Time [s]")
+    for panel in panels:
+        panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.7g}"))
     panel_letters(panels)
     figure.align_ylabels()
     return figure
@@ -99,17 +104,20 @@ def _control(panel: Axes, name: str, run: AnyRun, line: Mapping[str, Any], limit
     beside = f", {plain(_said(name))}" if name else ""
     low, high = limits or (-np.inf, np.inf)
     given = run.saturated_control[np.isfinite(run.saturated_control)]
-    least, most = (float(edge(given, initial=0.0)) for edge in (np.min, np.max))
+    least, most = (float(extreme(given, initial=0.0)) for extreme in (np.min, np.max))
     least, most = low if isfinite(low) else least, high if isfinite(high) else most
     traces = [
-        Trace(pd.Series(run.saturated_control), band(line), f"actuator{beside}"),
+        Trace(pd.Series(run.saturated_control), band(line), "actuator"),
         Trace(pd.Series(run.control), {**line, "linewidth": THIN}, f"control $u${beside}"),
     ]
     draw(panel, pd.Series(run.time_s), traces, max(-least, most))
     room = BEYOND * (most - least) or 1.0
     bottom, top = panel.get_ylim()
-    panel.set_ylim(max(bottom, least - room), min(top, most + room))
+    bottom, top = max(bottom, least - room), min(top, most + room)
     ends = [end for end in (low, high) if isfinite(end)]
+    near = [end for end in ends if bottom - FAR * (top - bottom) < end < top + FAR * (top - bottom)]
+    edge = EDGE * (top - bottom)
+    panel.set_ylim(min([bottom, *(end - edge for end in near)]), max([top, *(end + edge for end in near)]))
     for i, end in enumerate(ends):
         panel.axhline(end, **LINES["saturation limits"], zorder=3, label=None if i else "limits")
     if limits is not None:
@@ -117,7 +125,7 @@ def _control(panel: Axes, name: str, run: AnyRun, line: Mapping[str, Any], limit
         if len(bars):
             spans = [(start, end - start) for start, end in bars]
             across = panel.get_xaxis_transform()
-            panel.broken_barh(spans, (0, 1), transform=across, label="$u$ beyond the limits", **SATURATED)
+            panel.broken_barh(spans, (0, 1), transform=across, label="beyond them", **SATURATED)
     key(panel)
 
 
