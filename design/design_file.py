@@ -21,6 +21,7 @@ from identification.base.json_object import member, number, read_json, texts
 from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
 from identification.model.plant_json import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
+from identification.model.signals import UNNAMED, Signals
 
 SCHEMA = 3
 KINDS = ("delay-free", "extended")
@@ -56,6 +57,8 @@ class Design:
         Any others by their names.
     compared
         What each does beside none in one run, a sentence each, the one that does harm first; empty where none was run.
+    signals
+        Names and units of the plant's input and output.
     """
 
     kind: str
@@ -69,6 +72,7 @@ class Design:
     corrected: CorrectedCompensator
     added: Mapping[str, Compensator] = field(default_factory=dict)
     compared: tuple[str, ...] = ()
+    signals: Signals = UNNAMED
 
     def __repr__(self) -> str:
         omegas = ", ".join(f"{omega:.4g}" for omega in self.reference_omegas)
@@ -145,6 +149,7 @@ class Design:
         content = {
             "schema": SCHEMA,
             "kind": self.kind,
+            "signals": self.signals.to_dict(),
             "plant": plant_to_dict(self.plant),
             "additive_bound": bound_to_dict(self.additive_bound),
             "reference_omegas": list(self.reference_omegas),
@@ -194,6 +199,7 @@ def read_design(path: Path | str, kind: str | None = None) -> Design:
             corrected=CorrectedCompensator.from_dict(_named(kinds, "corrected")),
             added={n: Compensator.from_dict(kinds[n]) for n in kinds if n not in ("thesis", "corrected")},
             compared=texts(content, "compared") if "compared" in content else (),
+            signals=Signals.from_dict(member(content, "signals")) if "signals" in content else UNNAMED,
         )
         if (hinf is not None) != delay_free:
             raise InputError(f"hinf belongs to a delay-free design and to no other; kind is '{design.kind}'")

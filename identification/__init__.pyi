@@ -4,6 +4,7 @@ from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel, read_model
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
+from identification.model.signals import Signals
 from identification.sweeps.read_sweeps import read_sweeps
 from identification.sweeps.response import FrequencyResponse, alias_free
 
@@ -14,6 +15,7 @@ __all__ = [
     "InputError",
     "Mode",
     "PlantModel",
+    "Signals",
     "alias_free",
     "fit",
     "read_model",

@@ -148,6 +148,14 @@ fit_options = together(
 )
 """How a fit is made."""
 
+signal_options = together(
+    click.option("--input-name", default="input", show_default=True, help="What the plant's input is called."),
+    click.option("--input-unit", default="", help="Its unit, such as A."),
+    click.option("--output-name", default="output", show_default=True, help="What the plant's output is called."),
+    click.option("--output-unit", default="", help="Its unit, such as m."),
+)
+"""Names and units of the plant's input and output, which model.json and what is made of it keep."""
+
 
 @main.command()
 @click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)
@@ -159,6 +167,7 @@ fit_options = together(
 )
 @reading_options
 @fit_options
+@signal_options
 def fit(
     sweeps: tuple[Path, ...],
     output: Path,
@@ -171,6 +180,10 @@ def fit(
     bound_below: float | None,
     bound_above: float | None,
     seed: int,
+    input_name: str,
+    input_unit: str,
+    output_name: str,
+    output_unit: str,
     responses: Path | None,
     **reading: Any,
 ) -> None:
@@ -179,6 +192,7 @@ def fit(
 
     from identification.fit_model import fit_model
     from identification.formats.reading import Reading
+    from identification.model.signals import Signals
     from identification.model.structure import Wanted
     from identification.output.fit_facts import bound_remarks, bound_text, check_lines, table
     from identification.sweeps.kept_responses import write_responses
@@ -186,6 +200,7 @@ def fit(
 
     files = input_files(sweeps)
     require_writable(output, *([] if responses is None else [responses]), inputs=files)
+    signals = Signals(input_name, input_unit, output_name, output_unit)
     tests = read_sweeps(sweeps, Reading(**{k: v for k, v in reading.items() if v is not None}))
     with tqdm(desc="fits", unit="", disable=None, leave=False) as bar:
         wanted = Wanted(None if integrators == "auto" else int(integrators), modes, real)
@@ -199,6 +214,7 @@ def fit(
             bound_above=bound_above,
             seed=seed,
             band=band,
+            signals=signals,
             tick=bar.update,
         )
     text = fitted.model.to_json()

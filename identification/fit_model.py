@@ -18,6 +18,7 @@ from identification.model.fit_record import FitRecord
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import INTEGRATORS, PlantModel
 from identification.model.reports import BoundReport, SubspaceCheck
+from identification.model.signals import UNNAMED, Signals
 from identification.model.structure import MOST_REAL, Wanted
 from identification.output.cautions import POOR
 from identification.output.fit_facts import fit_record, standard_errors
@@ -67,6 +68,7 @@ def fit_model(
     bound_above: float | None = None,
     seed: int = 0,
     band: tuple[float, float] | None = None,
+    signals: Signals = UNNAMED,
     tick: Tick = lambda: None,
 ) -> ModelFit:
     """Fit the plant of Thesis Eq. (2.20) and the bound of (2.21) to tests.
@@ -81,6 +83,8 @@ def fit_model(
     band
         Lowest and highest frequency in Hz that is used of each test; None leaves out what is noise at both ends, see
         :func:`identification.sweeps.noise_lines.without_noise`.
+    signals
+        Names and units of the plant's input and output.
 
     Raises
     ------
@@ -102,7 +106,7 @@ def fit_model(
     clean = tuple(alias_free(test, result.plant) for test in used)
     report = bound_residuals(result.plant, clean, plants, bound_order, below=bound_below, above=bound_above)
     record = fit_record(used, result, report, checks, reversed_from)
-    model = IdentifiedModel(result.plant, report.bound, standard_errors(result), record)
+    model = IdentifiedModel(result.plant, report.bound, standard_errors(result), record, signals)
     return ModelFit(model, record, result, report, checks, clean)
 
 
@@ -147,6 +151,7 @@ def fit(
     bound_above: float | None = None,
     seed: int = 0,
     band: tuple[float, float] | None = None,
+    signals: Signals = UNNAMED,
 ) -> IdentifiedModel:
     """Fit plant and bound to tests, with what is left open chosen by the Bayesian information criterion.
 
@@ -158,7 +163,7 @@ def fit(
         Zero and pole modes (up to 8 each), real zeros and poles (up to 3 each): one number for both, or a pair.
     integrators
         Poles at s = 0, up to 2; a negative number, down to -2, counts zeros there.
-    soft, bound_order, bound_below, bound_above, seed, band
+    soft, bound_order, bound_below, bound_above, seed, band, signals
         As for :func:`fit_model`.
 
     Raises
@@ -179,6 +184,7 @@ def fit(
         bound_above=bound_above,
         seed=seed,
         band=band,
+        signals=signals,
     )
     return fitted.model
 

@@ -142,4 +142,5 @@ def design_delay_free(
         parameters=DelayFreeParameters(float(np.max(period_s)), epsilon),
         thesis=thesis,
         corrected=corrected,
+        signals=model.signals,
     )

@@ -124,6 +124,7 @@ def design_extended(
         parameters=parameters,
         thesis=thesis,
         corrected=corrected,
+        signals=model.signals,
     )
 
 

@@ -22,6 +22,7 @@ from identification.model.plant_json import (
     plant_to_dict,
     shaped,
 )
+from identification.model.signals import UNNAMED, Signals
 
 SCHEMA = 1
 
@@ -41,12 +42,15 @@ class IdentifiedModel:
         printed sets).
     fit
         How the model came about; None where there was no fit, or where an older version wrote less of it.
+    signals
+        Names and units of the plant's input and output.
     """
 
     plant: PlantModel
     additive_bound: AdditiveBound
     standard_errors: Numbers | None = None
     fit: FitRecord | None = None
+    signals: Signals = UNNAMED
 
     def __repr__(self) -> str:
         plant = self.plant
@@ -72,6 +76,7 @@ class IdentifiedModel:
         errors = self.standard_errors
         content = {
             "schema": SCHEMA,
+            "signals": self.signals.to_dict(),
             "plant": plant_to_dict(self.plant),
             "standard_errors": None if errors is None else shaped(self.plant, errors),
             "additive_bound": bound_to_dict(self.additive_bound),
@@ -92,9 +97,10 @@ def read_model(path: Path | str) -> IdentifiedModel:
     try:
         plant = plant_from_dict(member(content, "plant"))
         bound = bound_from_dict(member(content, "additive_bound"))
+        signals = Signals.from_dict(member(content, "signals")) if "signals" in content else UNNAMED
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return IdentifiedModel(plant, bound, _standard_errors(content, plant), _fit(content, plant, bound))
+    return IdentifiedModel(plant, bound, _standard_errors(content, plant), _fit(content, plant, bound), signals)
 
 
 def _standard_errors(content: Mapping[str, Any], plant: PlantModel) -> Numbers | None:
