@@ -99,6 +99,11 @@ class SampledController:
         return float(self.forward.d[0] * self.direct / (1 - self.around))
 
     @property
+    def remembered(self) -> int:
+        """How many samples the longest memory goes back, this one included; the length of a ring buffer for all."""
+        return int(max(np.max(block.first + block.length) for block in (self.feedback, self.theta)))
+
+    @property
     def standing(self) -> Standing:
         """The state that a start without a bump sets.
 
