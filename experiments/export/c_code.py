@@ -42,7 +42,11 @@ def c_files(controller: SampledController, vector: TestVector, precision: str = 
     """
     name, kind = controller.name, PRECISIONS[precision]
     environment = Environment(
-        loader=FileSystemLoader(HERE), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, autoescape=False
+        loader=FileSystemLoader(HERE),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
     )
 
     def number(value: float) -> str:
@@ -50,7 +54,7 @@ def c_files(controller: SampledController, vector: TestVector, precision: str = 
             held = kind(value)
         if not np.isfinite(held):
             raise InputError(f"the controller has the number {value:g}, which no {precision} holds; expected another")
-        return f"{held}" if precision == "double" else f"{held}F"
+        return f"{held!s}" if precision == "double" else f"{held!s}F"
 
     def table(values: Iterable[float]) -> str:
         return "\n".join(f"    {line}" for line in wrap(", ".join(map(number, values)), WIDTH))
@@ -140,8 +144,9 @@ def _memories(controller: SampledController) -> dict[str, Any]:
     windup = memory(theta, 1, "windup_output", value) if np.any(theta.C[1]) or theta.d[1] else None
     if len(feedback.b):
         keep("STANDING_FEEDBACK", standing.feedback)
-    if standing.is_bumpless:
+    if standing.slowest is not None:
         keep("STANDING_FORWARD", standing.forward)
+        keep("SLOWEST", standing.slowest)
     return {
         "tables": tables,
         "feedbacks": feedbacks,
@@ -150,5 +155,5 @@ def _memories(controller: SampledController) -> dict[str, Any]:
         "size": controller.remembered,
         "states": {"forward": len(forward.b), "feedback": len(feedback.b), "windup": len(theta.b)},
         "own": float(theta.d[0]) + controller.through,
-        "bumpless": standing.is_bumpless,
+        "bumpless": standing.slowest is not None,
     }
