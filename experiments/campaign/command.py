@@ -30,7 +30,7 @@ plant_options = together(
 @click.command("campaign")
 @plant_options
 @click.option("--limit", type=float, required=True, help="Saturation limits +-LIMIT.")
-@click.option("--periods", type=int, default=5, show_default=True, help="Length of a run in periods of the reference.")
+@click.option("--periods", type=int, default=5, help="Length of a run in periods of the reference.")
 @sinusoid_options
 def campaign_command(
     design: Path,
