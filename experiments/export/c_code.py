@@ -1,4 +1,4 @@
-"""A controller as C99: a header, a source, a test vector, and a program that checks the one on the other."""
+"""A controller as C99: a header, a source, a test run, and a program that checks the one on the other."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from experiments.drive.difference_equations import SampledBlock
 from experiments.export.controller import SampledController
 from experiments.export.names import identifier
-from experiments.export.test_vector import TestVector, commands
+from experiments.export.check_run import CheckRun, commands
 from identification.base.digits import upper_end
 from identification.base.errors import InputError
 
@@ -23,15 +23,15 @@ PRECISIONS = {"double": np.float64, "float": np.float32}
 WIDTH = 116
 
 
-def c_files(controller: SampledController, vector: TestVector, precision: str = "double") -> dict[str, str]:
+def c_files(controller: SampledController, run: CheckRun, precision: str = "double") -> dict[str, str]:
     """The files by their names: NAME.h, NAME.c, NAME_test.c and NAME_test.csv.
 
     Parameters
     ----------
     controller
         What is written.
-    vector
-        Samples of a run of this controller, see :func:`experiments.export.test_vector.test_vector`.
+    run
+        Samples of a run of this controller, see :func:`experiments.export.check_run.check_run`.
     precision
         One of :data:`PRECISIONS`, of all numbers in C.
 
@@ -63,8 +63,8 @@ def c_files(controller: SampledController, vector: TestVector, precision: str = 
     content = {
         "c": controller,
         "real": precision,
-        "samples": np.column_stack([vector.reference, vector.measurement, vector.control, vector.command]).tolist(),
-        "tolerance": _difference(controller, vector, kind),
+        "samples": np.column_stack([run.reference, run.measurement, run.control, run.command]).tolist(),
+        "tolerance": _difference(controller, run, kind),
         "input": identifier(controller.signals.input_name, "input"),
         "output": identifier(controller.signals.output_name, "output"),
         "limits": [limit if math.isfinite(limit) else None for limit in controller.limits],
@@ -78,16 +78,16 @@ def c_files(controller: SampledController, vector: TestVector, precision: str = 
         f"{name}.h": text("controller.h.j2"),
         f"{name}.c": text("controller.c.j2"),
         f"{name}_test.c": text("controller_test.c.j2"),
-        f"{name}_test.csv": vector.csv(),
+        f"{name}_test.csv": run.csv(),
     }
 
 
-def _difference(controller: SampledController, vector: TestVector, kind: type[np.floating]) -> float:
-    """How far the commands of this precision are from those of the vector, and from those rounded to it; rounded up."""
+def _difference(controller: SampledController, run: CheckRun, kind: type[np.floating]) -> float:
+    """How far the commands of this precision are from those of the run, and from those rounded to it; rounded up."""
     if kind is np.float64:
         return 0.0
-    found = commands(controller, vector.reference, vector.measurement, kind)
-    pairs = zip(found, (vector.control, vector.command), strict=True)
+    found = commands(controller, run.reference, run.measurement, kind)
+    pairs = zip(found, (run.control, run.command), strict=True)
     most = max(float(np.abs(own - each).max()) for own, exact in pairs for each in (exact, exact.astype(kind)))
     return float(upper_end(most * (1 + float(np.finfo(kind).eps)), 3))
 

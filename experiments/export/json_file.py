@@ -8,7 +8,7 @@ from typing import Any
 
 from experiments.drive.difference_equations import SampledBlock
 from experiments.export.controller import SampledController
-from experiments.export.test_vector import TestVector
+from experiments.export.check_run import CheckRun
 
 SCHEMA = 1
 STEP = (
@@ -26,7 +26,7 @@ MEMORY = (
 )
 
 
-def json_files(controller: SampledController, vector: TestVector) -> dict[str, str]:
+def json_files(controller: SampledController, run: CheckRun) -> dict[str, str]:
     """The files by their names: NAME.json, whose keys docs/export.md explains, and NAME_test.csv."""
     standing = controller.standing
     low, high = (limit if math.isfinite(limit) else None for limit in controller.limits)
@@ -55,7 +55,7 @@ def json_files(controller: SampledController, vector: TestVector) -> dict[str, s
         },
     }
     text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-    return {f"{controller.name}.json": text, f"{controller.name}_test.csv": vector.csv()}
+    return {f"{controller.name}.json": text, f"{controller.name}_test.csv": run.csv()}
 
 
 def _block(block: SampledBlock) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Samples of a run of a controller, on which an export of it is checked; and the same steps in any precision."""
+"""The run on which an export of a controller is checked; and the same steps in any precision."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BEYOND = 2.0  # times the farther limit, the control without limits
 
 
 @dataclass(frozen=True)
-class TestVector:
+class CheckRun:
     """What a controller gets and gives, sample by sample from rest, all shape (s,).
 
     Parameters
@@ -32,8 +32,6 @@ class TestVector:
     control, command
         What it asks for, and that within the limits.
     """
-
-    __test__ = False  # to pytest
 
     rate_hz: float
     reference: np.ndarray
@@ -50,7 +48,7 @@ class TestVector:
         return "\n".join(lines) + "\n"
 
 
-def test_vector(design: Design, controller: SampledController) -> TestVector:
+def check_run(design: Design, controller: SampledController) -> CheckRun:
     """A run of the sampled loop from rest, under a cosine that takes the control beyond the limits.
 
     Parameters
@@ -79,10 +77,7 @@ def test_vector(design: Design, controller: SampledController) -> TestVector:
     largest = float(np.abs(free).max())
     amplitude = BEYOND * farther / largest if farther > 0 and largest > 0 else 1.0
     reference, measurement, control = run(amplitude, controller.limits)
-    return TestVector(controller.rate_hz, reference, measurement, control, np.clip(control, *controller.limits))
-
-
-test_vector.__test__ = False  # type: ignore[attr-defined]
+    return CheckRun(controller.rate_hz, reference, measurement, control, np.clip(control, *controller.limits))
 
 
 def commands(
