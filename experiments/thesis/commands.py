@@ -204,9 +204,9 @@ def campaign(
 
     content = read_design(design)
     given = positive_limit(limit)
-    limit = usual_limit(content) if given is None else given
-    reference = thesis_reference(content.kind, content.reference_omegas)
-    run_campaign(content, design, plants, seed, reference, limit, usual_periods(content), scheduler, output, anew)
+    used = usual_limit(content) if given is None else given
+    limits, reference = (-used, used), thesis_reference(content.kind, content.reference_omegas)
+    run_campaign(content, design, plants, seed, reference, limits, usual_periods(content), scheduler, output, anew)
 
 
 @thesis.command("additive-error")
