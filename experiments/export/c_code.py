@@ -12,18 +12,18 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from experiments.drive.difference_equations import SampledBlock
+from experiments.export.check_run import CheckRun, commands
 from experiments.export.controller import SampledController
 from experiments.export.names import identifier
-from experiments.export.check_run import CheckRun, commands
 from identification.base.digits import upper_end
 from identification.base.errors import InputError
 
 HERE = Path(__file__).parent
-PRECISIONS = {"double": np.float64, "float": np.float32}
+PRECISIONS: dict[str, type[np.floating]] = {"double": np.float64, "float": np.float32}
 WIDTH = 116
 
 
-def c_files(controller: SampledController, run: CheckRun, precision: str = "double") -> dict[str, str]:
+def files(controller: SampledController, run: CheckRun, precision: str = "double") -> dict[str, str]:
     """The files by their names: NAME.h, NAME.c, NAME_test.c and NAME_test.csv.
 
     Parameters
@@ -98,14 +98,13 @@ def _comment(text: object) -> str:
 
 
 def _memories(controller: SampledController) -> dict[str, Any]:
-    """What the templates say of the blocks: their numbers as tables, and each output's memory, those that are 0 left out.
+    """What the templates say of the blocks: their numbers as tables, and the memory of each output that is not 0.
 
     Of an output ``value`` in C enters its memory, and d times the block's input is added last. ``ring`` is empty where
     the memory is this sample alone, which then counts ``tap`` times.
     """
-    forward, feedback, theta, standing = (
-        controller.forward, controller.feedback, controller.theta, controller.standing
-    )
+    forward, feedback, theta = controller.forward, controller.feedback, controller.theta
+    standing = controller.standing
     tables: list[tuple[str, list[float]]] = []
 
     def keep(name: str, values: np.ndarray) -> str:

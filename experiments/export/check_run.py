@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -120,7 +121,7 @@ def commands(
     p_T, p_w = np.zeros((len(d_T), len(r)), kind), np.zeros((1, len(r)), kind)
     control = np.zeros(len(r), kind)
 
-    def late(taps: Array, first: int, length: int, p: Array, k: int) -> np.floating:
+    def late(taps: Array, first: int, length: int, p: Array, k: int) -> Any:
         last = k - first
         count = min(length, last + 1)
         if count < 1:

@@ -128,7 +128,7 @@ def _slowest(A: np.ndarray, c: np.ndarray) -> np.ndarray | None:
         if abs(seen[k]) > UNSEEN * np.linalg.norm(c):
             q = complex(poles[k])
             beta = 1 + 1j * (q.real - 1) / q.imag if q.imag else 1.0
-            return np.real(beta * modes[:, k] / seen[k])
+            return np.asarray(np.real(beta * modes[:, k] / seen[k]))
     return None
 
 

@@ -7,8 +7,8 @@ import math
 from typing import Any
 
 from experiments.drive.difference_equations import SampledBlock
-from experiments.export.controller import SampledController
 from experiments.export.check_run import CheckRun
+from experiments.export.controller import SampledController
 
 SCHEMA = 1
 STEP = (
@@ -26,7 +26,7 @@ MEMORY = (
 )
 
 
-def json_files(controller: SampledController, run: CheckRun) -> dict[str, str]:
+def files(controller: SampledController, run: CheckRun) -> dict[str, str]:
     """The files by their names: NAME.json, whose keys docs/export.md explains, and NAME_test.csv."""
     standing = controller.standing
     low, high = (limit if math.isfinite(limit) else None for limit in controller.limits)

@@ -39,8 +39,8 @@ class Compiled:
 
     def __init__(self, files: Mapping[str, str], name: str, folder: Path, number: type = ctypes.c_double) -> None:
         _write(files, folder)
-        size = f'#include "{name}.h"\nint size_of(void);\nint size_of(void) {{ return (int)sizeof({name}_state); }}\n'
-        (folder / "size.c").write_text(size)
+        declared = f'#include "{name}.h"\nint size_of(void);\n'
+        (folder / "size.c").write_text(f"{declared}int size_of(void) {{ return (int)sizeof({name}_state); }}\n")
         library = folder / "lib.so"
         subprocess.run([compiler(), *FLAGS, *TRAPPED, f"{name}.c", "size.c", "-o", library], cwd=folder, check=True)
         calls = ctypes.CDLL(str(library))

@@ -20,9 +20,9 @@ from design.blocks.block import Block, plant_block
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
 from experiments.drive.sampled_loop import Drive, SampledRun, simulate_sampled
-from experiments.export.c_code import c_files
-from experiments.export.controller import SampledController, sampled_controller
+from experiments.export import c_code
 from experiments.export.check_run import check_run, commands
+from experiments.export.controller import SampledController, sampled_controller
 from experiments.runs.references import SampledReference
 from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
@@ -46,6 +46,7 @@ CASES = [
     ("chapter 2", 2000.0, "tustin", "corrected", (-12.0, 9.0)),
 ]
 
+
 @cache
 def designed(name: str) -> Design:
     plant, omega = PLANTS[name]
@@ -67,7 +68,7 @@ def case(request: pytest.FixtureRequest, delay_free_design: Design, tmp_path_fac
     name, rate_hz, method, anti_windup, limits = request.param
     design = delay_free_design if name == "chapter 2" else designed(name)
     controller = sampled_controller(design, anti_windup, limits, rate_hz, method, "axis")
-    files = c_files(controller, check_run(design, controller))
+    files = c_code.files(controller, check_run(design, controller))
     return Case(design, controller, Compiled(files, "axis", tmp_path_factory.mktemp("axis")))
 
 
@@ -106,7 +107,7 @@ def test_its_own_test_passes_under_sanitizers(extended_design: Design, precision
     run = check_run(extended_design, controller)
     assert run.control.max() > 10
     assert run.control.min() < -12
-    files = c_files(controller, run, precision)
+    files = c_code.files(controller, run, precision)
     said = self_test(files, "axis", tmp_path)
     assert said.startswith("axis: 1000 samples")
     off = f"{controller.forward.d[0] * 1.001:.17g}{'F' if precision == 'float' else ''}"
@@ -117,7 +118,7 @@ def test_its_own_test_passes_under_sanitizers(extended_design: Design, precision
 
 def test_a_float_takes_the_steps_that_its_difference_was_found_with(extended_design: Design, tmp_path: Path) -> None:
     controller = sampled_controller(extended_design, "corrected", (-12.0, 10.0), 2000.0, "exact", "axis")
-    files = c_files(controller, check_run(extended_design, controller), "float")
+    files = c_code.files(controller, check_run(extended_design, controller), "float")
     case = Case(extended_design, controller, Compiled(files, "axis", tmp_path, ctypes.c_float))
     reference, measurement, control = asked_run(case, 400)
     own, _ = commands(controller, reference, measurement, np.float32)
@@ -125,7 +126,7 @@ def test_a_float_takes_the_steps_that_its_difference_was_found_with(extended_des
         case.compiled.step(r, y)
         assert case.compiled.logged == (u, 0)
     np.testing.assert_allclose(own, control, rtol=0, atol=1e-4 * np.abs(control).max())
-    assert 0 < np.abs(own - control).max()
+    assert np.abs(own - control).max() > 0
 
 
 # The start
@@ -146,7 +147,7 @@ def test_a_start_without_a_bump_then_the_loop_follows(
     """From a hand's constant command, the plant at rest under it, to a reference elsewhere."""
     design = designed("none, whole samples")
     controller = sampled_controller(design, "corrected", (-2.0, 1.5), rate_hz, method, "axis")
-    compiled = Compiled(c_files(controller, check_run(design, controller)), "axis", tmp_path)
+    compiled = Compiled(c_code.files(controller, check_run(design, controller)), "axis", tmp_path)
     A, b, rest, late = held_steps(design.plant, 1 / rate_hz, applied)
     c, x = rest[: len(b)], rest[len(b) :]
     reference = 0.9
@@ -187,7 +188,7 @@ def test_a_controller_without_memory_of_its_error_says_that_it_cannot(extended_d
     blocks = {**extended_design.blocks, "K": Block(2.0), "T_so": Block(0.0)}
     design = dataclasses.replace(extended_design, plant=plant, blocks=blocks)
     controller = sampled_controller(design, "none", (-5.0, 5.0), 100.0, "exact", "gain")
-    files = c_files(controller, check_run(design, controller))
+    files = c_code.files(controller, check_run(design, controller))
     assert "no memory of its error" in files["gain.h"]
     compiled = Compiled(files, "gain", tmp_path)
     assert compiled.start(1.0, 0.0, -1.0) == 1
@@ -220,7 +221,7 @@ def test_names_are_identifiers_and_comments_end_where_they_should(extended_desig
     signals = Signals("2. Ström*/", "µA /* ??/", "位置", "°")
     controller = sampled_controller(extended_design, "corrected", (-12.0, 10.0), 2000.0, "tustin", "axis")
     controller = dataclasses.replace(controller, signals=signals)
-    files = c_files(controller, check_run(extended_design, controller))
+    files = c_code.files(controller, check_run(extended_design, controller))
     self_test(files, "axis", tmp_path)
     assert "command_2_Strom;" in files["axis.h"]
     assert "double reference_output, double measured_output" in files["axis.h"]
@@ -231,7 +232,7 @@ def test_the_code_calls_nothing(extended_design: Design, tmp_path: Path) -> None
     if shutil.which("nm") is None:
         pytest.skip("no nm")
     controller = sampled_controller(extended_design, "corrected", (-12.0, 10.0), 2000.0, "tustin", "axis")
-    for name, text in c_files(controller, check_run(extended_design, controller)).items():
+    for name, text in c_code.files(controller, check_run(extended_design, controller)).items():
         (tmp_path / name).write_text(text)
     subprocess.run([compiler(), "-std=c99", "-O1", "-c", "axis.c"], cwd=tmp_path, check=True)
     found = subprocess.run(["nm", "-u", "axis.o"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
