@@ -35,7 +35,7 @@ def self_test(files: Mapping[str, str], name: str, folder: Path) -> str:
 
 
 class Compiled:
-    """``NAME_step`` and ``NAME_start`` on one state, which is at rest at first; undefined behaviour ends the process."""
+    """``NAME_step`` and ``NAME_start`` on one state, at rest at first; undefined behaviour ends the process."""
 
     def __init__(self, files: Mapping[str, str], name: str, folder: Path, number: type = ctypes.c_double) -> None:
         _write(files, folder)

@@ -7,7 +7,6 @@ import math
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.signal import StateSpace, dlsim
 
@@ -22,7 +21,8 @@ def run_of_file(content: dict[str, Any], reference: np.ndarray, measurement: np.
     blocks = {name: content[name] for name in ("forward", "feedback", "windup")}
     x = {name: np.zeros(len(block["b"])) for name, block in blocks.items()}
     p = {name: [[] for _ in block["d"]] for name, block in blocks.items()}
-    low, high = (math.inf * sign if end is None else end for end, sign in zip(content["limits"].values(), (-1, 1)))
+    low, high = content["limits"]["low"], content["limits"]["high"]
+    low, high = -math.inf if low is None else low, math.inf if high is None else high
     control = []
 
     def row(name: str, o: int) -> float:
