@@ -13,7 +13,7 @@ import click
 
 from identification.base.command_line import CommandGroup
 
-COMMANDS = dict.fromkeys(("refit", "figures", "report"), "commands")
+COMMANDS = dict.fromkeys(("refit", "figures", "report"), "commands") | {"export": "export_command"}
 """Command of this package -> its module."""
 ROOMS = ("identification", "design", "experiments", "paper_figures")
 
