@@ -14,6 +14,7 @@ import click
 from identification.base.command_line import CommandGroup
 
 BUILDS = ("refit", "figures", "report")
+TOOLS = {"explore": "antiwindup.explore_command"}
 ROOMS = ("identification", "design", "experiments", "paper_figures")
 
 
@@ -21,20 +22,23 @@ class Rooms(CommandGroup):
     """The builds, and the groups of the rooms, each under its room's name and with its room's first line."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return [*BUILDS, *ROOMS]
+        return [*BUILDS, *TOOLS, *ROOMS]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name in ROOMS:
             found: click.Command = import_module(f"{cmd_name}.__main__").main
         elif cmd_name in BUILDS:
             found = getattr(import_module("antiwindup.commands"), cmd_name)
+        elif cmd_name in TOOLS:
+            found = getattr(import_module(TOOLS[cmd_name]), cmd_name)
         else:
             return None
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Builds"):
-            formatter.write_dl([(name, self.get_command(ctx, name).get_short_help_str(90)) for name in BUILDS])  # type: ignore[union-attr]
+            names = (*BUILDS, *TOOLS)
+            formatter.write_dl([(name, self.get_command(ctx, name).get_short_help_str(90)) for name in names])  # type: ignore[union-attr]
         with formatter.section("Commands"):
             formatter.write_dl([(room, str(import_module(room).__doc__).splitlines()[0]) for room in ROOMS])
 

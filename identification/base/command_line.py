@@ -18,7 +18,7 @@ from identification.base.files import write_protected_too
 
 QUOTED = 80  # characters of a value in a sentence
 WRITTEN = {"output", "page", "build", "responses", "record"}  # options that name what a command writes
-EXTRAS = {"dask": "campaign", "distributed": "campaign", "pyarrow": "campaign"}  # of pyproject.toml, by their modules
+EXTRAS = {"bokeh": "explore", "dask": "campaign", "distributed": "campaign", "pyarrow": "campaign"}  # of pyproject.toml, by their modules
 
 
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
