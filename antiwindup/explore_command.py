@@ -39,10 +39,11 @@ def explore(
     no_browser: bool,
     output: Path | None,
 ) -> None:
-    """Open a page with sliders for DESIGN: its run, Nyquist plot, step and audit are redrawn as they are dragged.
+    """Open a local page with sliders for DESIGN: run, Nyquist plot, step, audit.
 
-    The page is for this machine alone, and ends with Ctrl-C. Its address holds what the sliders say, so that a copy of
-    it opens the same page as long as the command runs; "save" writes the design shown as design.json.
+    All are redrawn as a slider is dragged. The page is for this machine alone, and ends with Ctrl-C. Its address holds
+    what the sliders say, so that a copy of it opens the same page as long as the command runs; "save" writes the
+    design shown as design.json.
     """
     import webbrowser
 

@@ -123,7 +123,7 @@ class Explorer:
         self._margins = lru_cache(KEPT)(self._margins_of)
 
     def _designed(self, choices: Choices) -> Design:
-        """The design of the choices: what is not among them is that of the file; raises InputError as designs do."""
+        """The design of the choices, for the rest that of the file; raises InputError as designs do."""
         file, own = self.file, self.file.corrected
         if choices == self.start.choices:
             return file
@@ -133,9 +133,14 @@ class Explorer:
         sector = own.sector if choices.guarantee == own.guarantee and own.sector not in (SECTOR, *WEAKER) else None
         parameters = file.parameters
         if isinstance(parameters, DelayFreeParameters):
-            periods = [2 * math.pi / omega for omega in choices.reference_omegas]
             found = design_delay_free(
-                model, periods, parameters.epsilon, recovery_s, sector, own.bandwidth, choices.guarantee
+                model,
+                choices.reference_omegas,
+                parameters.epsilon,
+                recovery_s,
+                sector,
+                own.bandwidth,
+                choices.guarantee,
             )
         else:
             sinusoids = tuple(omega for omega in file.reference_omegas if omega)
@@ -156,7 +161,7 @@ class Explorer:
         return replace(found, added=file.added)
 
     def _recovers_as_the_loop(self) -> bool:
-        """Whether the recovery of the file is that of its loop, to the lattice of the poles, and none that was given."""
+        """Whether the recovery of the file is that of its loop, to the lattice of the poles; else it was given."""
         share = self.file.corrected.judgement.recovery_s / _settled_s(self.file)
         return 10 ** (-1.01 / RATES) < share < 10 ** (0.01 / RATES)
 

@@ -30,6 +30,7 @@ from paper_figures.explore.words import (
     stability_text,
     table,
     true_plant_text,
+    without_tex,
 )
 
 QUIET_S = 0.3  # without a new value, before what takes longer than a run is computed
@@ -64,7 +65,7 @@ class Page:
     design, output
         The file that was read, and the one that "save" writes.
     refused
-        Why the address asks for nothing that can be shown; else empty.
+        Why what the address asks for is not shown; else empty.
     """
 
     def __init__(
@@ -81,7 +82,8 @@ class Page:
         self.design, self.output = design, output
         self.pictures = Pictures(explorer.file.signals)
         self.drawing, self.judging, self.saving = Newest(self._draw), Newest(self._judge), Newest(self._save)
-        self.said = _words("said", paragraphs(refused), polite=True)
+        self.refused = refused
+        self.said = _words("said", polite=True)
         self.facts, self.margins = _words("facts"), _words("margins")
         self.promised, self.saved = _words("promised"), _words("saved", polite=True)
         button = Button(label=f"save as {output.name}", name="save", sizing_mode="stretch_width")
@@ -94,7 +96,7 @@ class Page:
             *moved, chosen, button, self.saved, name="sliders", sizing_mode="stretch_width", tags=[state.query]
         )
         self.column.js_on_change("tags", CustomJS(code=ADDRESS))
-        audit = Column(self.said, self.promised, self.margins, self.facts, name="audit", sizing_mode="stretch_width")
+        audit = Column(self.promised, self.margins, self.facts, name="audit", sizing_mode="stretch_width")
         for root in (self.column, self.said, *self.pictures.all, audit):
             document.add_root(root)
         document.title = f"{design.name}: {explorer.file.kind} design"
@@ -104,7 +106,7 @@ class Page:
     def _slider(self, given: Range) -> Slider | RangeSlider:
         """The widget of a range, which changes its numbers of the state."""
         settings: dict[str, Any] = {
-            "title": given.title,
+            "title": without_tex(given.title),
             "start": given.low,
             "end": given.high,
             "step": given.step,
@@ -128,9 +130,9 @@ class Page:
 
     def _change(self, numbers: dict[str, tuple[float, ...]], guarantee: str | None = None) -> None:
         try:
-            self.state = self.state.changed(numbers, guarantee)
+            self.state, self.refused = self.state.changed(numbers, guarantee), ""
         except InputError as error:
-            self.said.text = paragraphs(str(error))
+            self.said.text = paragraphs(f"{error}.")
             return
         self.column.tags = [self.state.query]
         self.drawing.ask(self.state)
@@ -149,7 +151,7 @@ class Page:
         linear, run = drawn
         self.pictures.show_linear(linear)
         self.pictures.show_run(run, state.limits)
-        self.said.text = paragraphs(true, stability_text(linear), run_text(run))
+        self.said.text = paragraphs(self.refused, true, stability_text(linear), run_text(run))
 
     async def _judge(self, state: State) -> None:
         """What takes longer than a run, once nothing has moved for a while."""
@@ -187,6 +189,12 @@ def _attempt(compute: Callable[[], Any]) -> Any:
         return str(error)
 
 
-def _words(name: str, text: str = "", polite: bool = False) -> Div:
+def _words(name: str, polite: bool = False) -> Div:
     attributes = {"aria-live": "polite"} if polite else {}
-    return Div(text=text, name=name, html_attributes=attributes, stylesheets=[TABLE], sizing_mode="stretch_width")
+    return Div(
+        name=name,
+        html_attributes=attributes,
+        stylesheets=[TABLE],
+        sizing_mode="stretch_width",
+        disable_math=True,
+    )

@@ -13,6 +13,7 @@ from bokeh.plotting import figure as bokeh_figure
 from experiments.engine.simulate import Run
 from identification.model.signals import Signals
 from paper_figures.explore.compute import Linear, saturated
+from paper_figures.explore.words import without_tex
 from paper_figures.look.panels import band
 from paper_figures.look.style import LINES
 
@@ -21,7 +22,7 @@ HOLDS: dict[str, Any] = {"line_color": "#D55E00", "line_width": 2.0, "line_dash"
 SHADE: dict[str, Any] = {"fill_color": "#E69F00", "fill_alpha": 0.22, "line_color": None}
 MIDDLE, VIEW = -0.5, 2.0  # of the Nyquist plot: its middle on the real axis, and half its height
 ROOM = 1.6  # of the limits, above and below them
-LEFT = 64  # pixels for the labels of an axis, so that panels one above the other have one time axis
+LEFT = 72  # pixels for the labels of an axis, so that panels one above the other have one time axis
 SQUARE = """
 const half = VIEW * cb_obj.inner_width / cb_obj.inner_height
 x_range.setv({start: MIDDLE - half, end: MIDDLE + half, reset_start: MIDDLE - half, reset_end: MIDDLE + half})
@@ -126,7 +127,7 @@ class Pictures:
             panel.vstrip(x0="start", x1="end", source=self.data["saturated"], legend_label="saturated", **SHADE)
         for panel, source, name, look, said in (
             (self.output, "run", "output", own, "output"),
-            (self.output, "run", "y_lin", line("family 5"), "without limits"),
+            (self.output, "run", "y_lin", line("family 5"), "no limits"),
             (self.output, "run", "reference", line("reference"), "reference"),
             (self.control, "run", "saturated_control", pale, "sat(u)"),
             (self.control, "run", "control", own, "u"),
@@ -147,7 +148,7 @@ class Pictures:
         for side in ("inner_width", "inner_height"):
             panel.js_on_change(side, CustomJS(args={"x_range": panel.x_range}, code=square))
         bound = line("bound") | {"line_width": 1.0}
-        for name, look, said in (("discs", bound, "W_a"), ("holding", HOLDS, "W_a, holds -1")):
+        for name, look, said in (("discs", bound, "W_a"), ("holding", HOLDS, "W_a around -1")):
             panel.circle(
                 "real",
                 "imag",
@@ -170,7 +171,7 @@ def _figure(name: str, title: str, x: str, y: str, x_range: Range1d, y_range: Ra
         name=name,
         title=title,
         x_axis_label=x,
-        y_axis_label=y,
+        y_axis_label=without_tex(y),
         x_range=x_range,
         y_range=y_range,
         sizing_mode="stretch_both",
@@ -200,11 +201,11 @@ def _key(panel: bokeh_figure) -> None:
     panel.add_layout(legend, "above")
     legend.orientation = "horizontal"
     legend.border_line_color = None
-    legend.padding, legend.margin, legend.spacing, legend.label_standoff = 0, 2, 10, 4
+    legend.padding, legend.margin, legend.spacing, legend.label_standoff = 0, 2, 8, 3
     legend.label_text_font_size = "12px"
     legend.label_text_color = "#000000"
     legend.glyph_height = legend.label_height = 14
-    legend.glyph_width = 22
+    legend.glyph_width = 18
 
 
 def _view(signals: Sequence[np.ndarray]) -> tuple[float, float]:

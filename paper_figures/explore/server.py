@@ -7,7 +7,7 @@ import hmac
 import secrets
 from collections.abc import Callable
 from pathlib import Path
-from socket import socket
+from socket import create_server, socket
 from typing import Any
 
 from bokeh.application import Application
@@ -19,7 +19,6 @@ from bokeh.settings import settings
 from tornado.httpserver import HTTPServer
 from tornado.httputil import HTTPServerRequest
 from tornado.ioloop import IOLoop
-from tornado.netutil import bind_sockets
 from tornado.routing import Router
 from tornado.web import ErrorHandler
 
@@ -75,9 +74,11 @@ def bound(port: int) -> socket:
         The port is taken, or may not be had.
     """
     try:
-        return bind_sockets(port, HOST)[0]
+        place = create_server((HOST, port))
     except OSError as error:
         raise InputError(f"--port is {port}, which cannot be had ({error.strerror}); expected a free one") from None
+    place.setblocking(False)
+    return place
 
 
 def serve(design: Design, start: State, read: Path, output: Path, place: socket, tell: Callable[[str], object]) -> None:
@@ -105,7 +106,7 @@ def serve(design: Design, start: State, read: Path, output: Path, place: socket,
         try:
             state = from_words(words, start)
         except InputError as error:
-            refused = str(error)
+            refused = f"{error}."
         Page(document, explorer, state, [each.including(state) for each in sliders], read, output, refused)
 
     token = secrets.token_urlsafe(TOKEN_BYTES)

@@ -17,7 +17,10 @@ from identification.base.errors import InputError, shown
 Numbers = dict[str, tuple[float, ...]]
 """The numbers of a state by the names that the address has: those of the commands' options, where there is one."""
 
-POSITIVE = ("reference-omega", "a", "recovery", "gain", "mode-frequency")
+POSITIVE, NOT_NEGATIVE = (math.ulp(0.0), "a positive number"), (0.0, "zero or a positive number")
+ALLOWED = dict.fromkeys(("a", "recovery", "gain", "mode-frequency"), POSITIVE)
+ALLOWED |= dict.fromkeys(("reference-omega", "dead-time"), NOT_NEGATIVE)
+"""The least that a number of a name may be, and how a sentence says so; others may be any finite number."""
 GUARANTEE = "guarantee"
 
 
@@ -88,10 +91,9 @@ class State:
     def __post_init__(self) -> None:
         for name, values in self.numbers.items():
             for value in values:
-                positive = name in POSITIVE and not (name == "reference-omega" and value == 0)
-                if not math.isfinite(value) or (positive and value <= 0) or (name == "dead-time" and value < 0):
-                    expected = "a positive number" if positive else "a finite number"
-                    raise InputError(f"{name} is {value:g}; expected {expected}, and no negative dead time")
+                least, expected = ALLOWED.get(name, (-math.inf, "a finite number"))
+                if not (math.isfinite(value) and value >= least):
+                    raise InputError(f"{name} is {value:g}; expected {expected}")
         low, high = self.limits
         if not low < high:
             raise InputError(f"the limits are {low:g} and {high:g}; expected the lower one first")
@@ -123,7 +125,7 @@ class State:
     @property
     def query(self) -> str:
         """The state as the part of an address behind its question mark, each number to its last digit."""
-        words = [(name, repr(value)) for name, values in self.numbers.items() for value in values]
+        words = [(name, repr(float(value))) for name, values in self.numbers.items() for value in values]
         return urlencode([*words, (GUARANTEE, self.choices.guarantee)])
 
     def changed(self, numbers: Mapping[str, Sequence[float]], guarantee: str | None = None) -> State:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from html import escape
 
@@ -15,6 +16,7 @@ from identification.base.digits import percent
 from paper_figures.explore.compute import Judged, Linear, saturated
 from paper_figures.explore.state import TruePlant
 
+TEX = re.compile(r"\$\$|\\\(|\\\[")
 Rows = Sequence[Sequence[str]]
 
 MARGINS: dict[str, Callable[[Margins], str]] = {
@@ -93,3 +95,8 @@ def table(rows: Rows, has_head: bool = False) -> str:
 def paragraphs(*sentences: str) -> str:
     """Sentences as HTML, those that are empty left out."""
     return "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences if sentence)
+
+
+def without_tex(text: str) -> str:
+    """A name that Bokeh, which sets as HTML what holds a sign of TeX, takes as it is."""
+    return TEX.sub(lambda found: "\u200b".join(found[0]), text)
