@@ -17,6 +17,7 @@ from experiments.export.controller import SampledController
 from experiments.export.names import identifier
 from identification.base.digits import upper_end
 from identification.base.errors import InputError
+from identification.model.signals import Signals
 
 HERE = Path(__file__).parent
 PRECISIONS: dict[str, type[np.floating]] = {"double": np.float64, "float": np.float32}
@@ -41,6 +42,7 @@ def files(controller: SampledController, run: CheckRun, precision: str = "double
         A number of the controller is beyond a float.
     """
     name, kind = controller.name, PRECISIONS[precision]
+    given, seen = names(controller.signals)
     environment = Environment(
         loader=FileSystemLoader(HERE),
         undefined=StrictUndefined,
@@ -65,8 +67,8 @@ def files(controller: SampledController, run: CheckRun, precision: str = "double
         "real": precision,
         "samples": np.column_stack([run.reference, run.measurement, run.control, run.command]).tolist(),
         "tolerance": _difference(controller, run, kind),
-        "input": identifier(controller.signals.input_name, "input"),
-        "output": identifier(controller.signals.output_name, "output"),
+        "input": given,
+        "output": seen,
         "limits": [limit if math.isfinite(limit) else None for limit in controller.limits],
         **_memories(controller),
     }
@@ -80,6 +82,11 @@ def files(controller: SampledController, run: CheckRun, precision: str = "double
         f"{name}_test.c": text("controller_test.c.j2"),
         f"{name}_test.csv": run.csv(),
     }
+
+
+def names(signals: Signals) -> tuple[str, str]:
+    """What the names of variables say of the input and of the output, after a word of their own."""
+    return identifier(signals.input_name, "input"), identifier(signals.output_name, "output")
 
 
 def _difference(controller: SampledController, run: CheckRun, kind: type[np.floating]) -> float:
