@@ -66,20 +66,21 @@ def files(controller: SampledController, run: CheckRun, precision: str = "double
         "c": controller,
         "real": precision,
         "samples": np.column_stack([run.reference, run.measurement, run.control, run.command]).tolist(),
-        "tolerance": _difference(controller, run, kind),
         "input": given,
         "output": seen,
         "limits": [limit if math.isfinite(limit) else None for limit in controller.limits],
         **_memories(controller),
     }
 
-    def text(template: str) -> str:
-        return environment.get_template(template).render(content)
+    def text(template: str, **more: float) -> str:
+        return environment.get_template(template).render(content, **more)
 
+    source = text("controller.c.j2")  # first, since it refuses what no float holds
+    tolerance = _difference(controller, run, kind)
     return {
-        f"{name}.h": text("controller.h.j2"),
-        f"{name}.c": text("controller.c.j2"),
-        f"{name}_test.c": text("controller_test.c.j2"),
+        f"{name}.h": text("controller.h.j2", tolerance=tolerance),
+        f"{name}.c": source,
+        f"{name}_test.c": text("controller_test.c.j2", tolerance=tolerance),
         f"{name}_test.csv": run.csv(),
     }
 
