@@ -10,7 +10,6 @@ import click
 
 from experiments.options import DESIGN, LIMIT_PAIR, asked_limits
 from experiments.pair_options import PairCommand
-from identification.base.command_line import with_force
 from identification.base.errors import InputError
 from identification.base.path_types import OUTPUT_FOLDER
 
@@ -18,7 +17,6 @@ WRITERS = {"c": "c_code", "json": "json_file", "fmu": "fmu"}
 """Target -> its module in experiments.export, whose function ``files`` gives the content of each file by its name."""
 
 
-@with_force
 @click.command("export", cls=PairCommand)
 @DESIGN
 @click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
