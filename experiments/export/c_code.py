@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from experiments.drive.difference_equations import SampledBlock
 from experiments.export.check_run import CheckRun, commands
 from experiments.export.controller import SampledController
 from experiments.export.names import identifier
+from experiments.export.templates import templates
 from identification.base.digits import upper_end
 from identification.base.errors import InputError
 from identification.model.signals import Signals
 
-HERE = Path(__file__).parent
 PRECISIONS: dict[str, type[np.floating]] = {"double": np.float64, "float": np.float32}
 WIDTH = 116
 
@@ -43,13 +41,6 @@ def files(controller: SampledController, run: CheckRun, precision: str = "double
     """
     name, kind = controller.name, PRECISIONS[precision]
     given, seen = names(controller.signals)
-    environment = Environment(
-        loader=FileSystemLoader(HERE),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
 
     def number(value: float) -> str:
         with np.errstate(over="ignore"):
@@ -59,9 +50,9 @@ def files(controller: SampledController, run: CheckRun, precision: str = "double
         return f"{held!s}" if precision == "double" else f"{held!s}F"
 
     def table(values: Iterable[float]) -> str:
-        return "\n".join(f"    {line}" for line in wrap(", ".join(map(number, values)), WIDTH))
+        return "\n".join(f"    {line}" for line in wrap(", ".join(map(number, values)), WIDTH, break_on_hyphens=False))
 
-    environment.filters.update(number=number, rows=table, comment=_comment)
+    environment = templates(number=number, rows=table, comment=_comment)
     content = {
         "c": controller,
         "real": precision,

@@ -15,15 +15,13 @@ from pathlib import Path
 from typing import NamedTuple
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 from experiments.export import c_code
 from experiments.export.check_run import CheckRun
 from experiments.export.controller import SampledController
+from experiments.export.templates import templates
 from identification.base.errors import InputError
 from identification.base.files import partial_file
 
-HERE = Path(__file__).parent
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC")
 LIBRARIES = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("win", ".dll")}
 SAID = 200  # characters of what a compiler says
@@ -56,15 +54,6 @@ def files(controller: SampledController, run: CheckRun) -> dict[str, str | bytes
     written = c_code.files(controller, run)
     own = {file: written[file] for file in (f"{name}.h", f"{name}.c")}
     given, seen = c_code.names(signals)
-    environment = Environment(
-        loader=FileSystemLoader(HERE),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=lambda template: str(template).endswith(".xml.j2"),
-    )
-    environment.filters["number"] = repr
     content = {
         "c": controller,
         "guid": sha256("".join(own.values()).encode()).hexdigest(),
@@ -79,6 +68,7 @@ def files(controller: SampledController, run: CheckRun) -> dict[str, str | bytes
             _Variable("invalid", "output", "", "samples in a row that were not finite"),
         ],
     }
+    environment = templates(number=repr)
     sources = own | {f"{name}_fmu.c": environment.get_template("fmu.c.j2").render(content)}
     system, suffix = _machine()
     archive = {
