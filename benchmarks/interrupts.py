@@ -62,6 +62,7 @@ COMMANDS = {
     "export": [
         *["antiwindup", "export", "{extended}", "--to", "c", "--rate", "2000", "--limit", "12", "--output", "{folder}"],
     ],
+    "explore": ["antiwindup", "explore", "{extended}", "--no-browser", "--output", "{folder}/d.json"],
     "refit": ["antiwindup", "refit", *SWEEPS, "--output", "{folder}/built"],
 }  # fmt: skip
 FILES = {
