@@ -36,7 +36,8 @@ COMMANDS = {
     "fit": ["identification", "fit", *SWEEPS, "--output", "{folder}/m.json", "--responses", "{folder}/r.npz"],
     "extended": ["design", "extended", "implied", *EXTENDED, "--output", "{folder}/d.json"],
     "delay-free": [
-        *["design", "delay-free", "implied", "--period", "4", "--epsilon", "1e-4", "--output", "{folder}/d.json"],
+        *["design", "delay-free", "implied", "--reference-hz", "0.25"],
+        *["--epsilon", "1e-4", "--output", "{folder}/d.json"],
     ],
     "audit": ["design", "audit", "{extended}"],
     "simulate": [
@@ -58,6 +59,9 @@ COMMANDS = {
     "bode": ["paper_figures", "bode", "{model}", *SWEEPS, "--output", "{folder}"],
     "summary": ["paper_figures", "summary", "{model}", *SWEEPS, "--build", "{folder}"],
     "report": ["paper_figures", "report", "implied", *SWEEPS, "--build", "{folder}"],
+    "export": [
+        *["antiwindup", "export", "{extended}", "--to", "c", "--rate", "2000", "--limit", "12", "--output", "{folder}"],
+    ],
     "refit": ["antiwindup", "refit", *SWEEPS, "--output", "{folder}/built"],
 }  # fmt: skip
 FILES = {
@@ -69,6 +73,7 @@ FILES = {
     "draw": 4,
     "bode": 4,
     "summary": 4,
+    "export": 4,
 }  # others one
 
 KEPT = ("c.parquet.parts/", "built/")  # so that the same command goes on

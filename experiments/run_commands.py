@@ -11,11 +11,11 @@ import click
 
 from experiments.options import DESIGN, LIMIT_PAIR, asked_limits, disturbance_options, reference_options
 from experiments.pair_options import PairCommand
-from experiments.tables import write_tables
+from experiments.tables import csv_writer
 from identification.base.command_line import together
 from identification.base.errors import InputError
-from identification.base.files import require_writable
-from identification.base.path_types import OUTPUT_FILE
+from identification.base.files import require_writable, write_whole
+from identification.base.path_types import FIGURE_FILE, OUTPUT_FILE
 
 MOST_ROWS = 1e7
 UNJUDGED = "Whether the guarantee covers the run is not judged under disturbances"
@@ -33,21 +33,22 @@ _run_options = together(
     reference_options,
     disturbance_options,
     click.option(
+        "--rate-limit",
+        type=float,
+        default=math.inf,
+        help="Most change of the actuator in a second, in its unit, unknown to the controller.",
+    ),
+    click.option(
         "--plant", help="The true plant: a model.json, table or implied; the design's own model unless given."
     ),
     click.option("--output", type=OUTPUT_FILE, required=True, help="CSV to write."),
+    click.option("--figure", type=FIGURE_FILE, help="Draw the run: .pdf, .svg or .png."),
 )
 
 
 @click.command("simulate", cls=PairCommand)
 @_run_options
 @click.option("--sample-time", type=float, required=True, help="Distance of the output's rows in seconds.")
-@click.option(
-    "--rate-limit",
-    type=float,
-    default=math.inf,
-    help="Most change of the actuator in a second, in its unit, unknown to the controller; inf by default.",
-)
 @click.option("--alpha", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
 @click.option("--beta", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
 @click.option("--gamma", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
@@ -67,6 +68,7 @@ def simulate_command(
     noise: tuple[float, float] | None,
     seed: int | None,
     output: Path,
+    figure: Path | None,
     **reference: Any,
 ) -> None:
     """Run DESIGN from rest: time_s, reference, output, error, control, saturated_control; with noise measured."""
@@ -97,7 +99,7 @@ def simulate_command(
     if numbers and anti_windup != "thesis":
         raise InputError(f"--{next(iter(numbers))} belongs to --anti-windup thesis; found --anti-windup {anti_windup}")
     inputs = _inputs(design, plant, reference["reference"])
-    require_writable(output, inputs=inputs)
+    require_writable(output, *([] if figure is None else [figure]), inputs=inputs)
     content = read_design(design)
     kind = content.chosen(anti_windup)
     if numbers:
@@ -135,7 +137,13 @@ def simulate_command(
     else:
         given = guarantee(content, kind, true)
         promised = str(judge_run(given, loop, limits, run, asked, true or content.loop_plant))
-    write_tables({output: table}, inputs)
+    writers = {output: csv_writer(table)}
+    if figure is not None:
+        from paper_figures.look.plot_run import plot_run
+        from paper_figures.look.style import figure_writer
+
+        writers[figure] = figure_writer(plot_run({anti_windup: run}, limits, content.signals))
+    write_whole(writers, inputs)
     beyond, crossings = ("saturated", "crossings of the limits")
     if math.isfinite(rate_limit):
         beyond, crossings = ("saturated or slewing", "beginnings and ends of saturation or slewing")
@@ -149,20 +157,18 @@ def simulate_command(
 @_run_options
 @click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
 @click.option("--method", required=True, help="How its blocks are discretised, tustin or exact.")
-@click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels; 0, no levels, by default.")
-@click.option("--slew", type=float, default=math.inf, help="Most change of the actuator in a second; inf by default.")
-@click.option("--input-delay", type=float, default=0.0, help="From sample to actuator in seconds; 0 by default.")
+@click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels in its unit; 0, no levels.")
+@click.option("--input-delay", type=float, default=0.0, help="From sample to actuator in seconds.")
 @click.option(
     "--form",
     default="coprime",
-    show_default=True,
     help="How the controller is realised: coprime, without hidden modes, or thesis, as drawn in Fig. 2.6.",
 )
 @click.option(
     "--resolution",
     type=float,
     default=0.0,
-    help="Of the computer's own numbers, in the actuator's unit; 0, as fine as doubles, by default.",
+    help="Of the computer's own numbers, in the actuator's unit; 0, as fine as doubles.",
 )
 def sampled_command(
     design: Path,
@@ -172,7 +178,7 @@ def sampled_command(
     rate: float,
     method: str,
     quantum: float,
-    slew: float,
+    rate_limit: float,
     input_delay: float,
     form: str,
     resolution: float,
@@ -182,6 +188,7 @@ def sampled_command(
     noise: tuple[float, float] | None,
     seed: int | None,
     output: Path,
+    figure: Path | None,
     **reference: Any,
 ) -> None:
     """Run DESIGN's controller on a computer with a real actuator, a row each sample, the columns as of simulate.
@@ -201,10 +208,10 @@ def sampled_command(
     from experiments.runs.region import require_within_region
     from experiments.runs.sector_promise import steady_control, verdict
 
-    drive = Drive(rate, method, asked_limits(limit), quantum, slew, input_delay, resolution)
+    drive = Drive(rate, method, asked_limits(limit), quantum, rate_limit, input_delay, resolution)
     _require_few_rows(until * rate)
     inputs = _inputs(design, plant, reference["reference"])
-    require_writable(output, inputs=inputs)
+    require_writable(output, *([] if figure is None else [figure]), inputs=inputs)
     content = read_design(design)
     kind = content.chosen(anti_windup)
     asked = reference_of(content, **reference)
@@ -226,7 +233,13 @@ def sampled_command(
         if found.covered:
             promised = f"No guarantee on a computer; in continuous time the run would be within it: {found.needs}"
     columns = {name: values for name, values in vars(run).items() if values is not None}
-    write_tables({output: pd.DataFrame(columns)}, inputs)
+    writers = {output: csv_writer(pd.DataFrame(columns))}
+    if figure is not None:
+        from paper_figures.look.plot_run import plot_run
+        from paper_figures.look.style import figure_writer
+
+        writers[figure] = figure_writer(plot_run({anti_windup: run}, drive.limits, content.signals))
+    write_whole(writers, inputs)
     click.echo(_first(promised, f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}"))
 
 

@@ -19,7 +19,7 @@ import click
 
 from identification.base.command_line import CommandGroup, together
 from identification.base.files import require_writable, write_whole
-from identification.base.path_types import INPUT, OUTPUT_FILE
+from identification.base.path_types import FIGURE_FILE, INPUT, OUTPUT_FILE
 from identification.model.additive_bound import HIGHEST_ORDER
 
 
@@ -95,20 +95,19 @@ fit_options = together(
         default="auto",
         type=Counts(8),
         metavar="auto|N|Z/P",
-        help="Zero and pole modes, up to 8.  [default: auto]",
+        help="Zero and pole modes, up to 8.",
     ),
     click.option(
         "--real",
         default="auto",
         type=Counts(3),
         metavar="auto|N|Z/P",
-        help="Real zeros and poles, up to 3.  [default: auto]",
+        help="Real zeros and poles, up to 3.",
     ),
     click.option(
         "--integrators",
         default="auto",
         type=click.Choice(["auto", "-2", "-1", "0", "1", "2"]),
-        show_default=True,
         help="Poles at s = 0; a negative number counts zeros there.",
     ),
     click.option(
@@ -122,14 +121,12 @@ fit_options = together(
         "--loss",
         default="least-squares",
         type=click.Choice(["least-squares", "soft-l1"]),
-        show_default=True,
         help="soft-l1: outliers can hardly move the fit.",
     ),
     click.option(
         "--bound-order",
         default=2,
         type=click.IntRange(1, HIGHEST_ORDER),
-        show_default=True,
         help="Poles of W_a; 2 is Eq. (2.22).",
     ),
     click.option(
@@ -144,15 +141,15 @@ fit_options = together(
         metavar="LEVEL",
         help="The same from the highest line to ten times it; above, W_a falls off like 1/s.",
     ),
-    click.option("--seed", default=0, type=click.IntRange(min=0), show_default=True, help="Of the random restarts."),
+    click.option("--seed", default=0, type=click.IntRange(min=0), help="Of the random restarts."),
 )
 """How a fit is made."""
 
 signal_options = together(
-    click.option("--input-name", default="input", show_default=True, help="What the plant's input is called."),
-    click.option("--input-unit", default="", help="Its unit, such as A."),
-    click.option("--output-name", default="output", show_default=True, help="What the plant's output is called."),
-    click.option("--output-unit", default="", help="Its unit, such as m."),
+    click.option("--input-name", default="input", help="What the plant's input is called."),
+    click.option("--input-unit", default="", show_default=False, help="Its unit, such as A."),
+    click.option("--output-name", default="output", help="What the plant's output is called."),
+    click.option("--output-unit", default="", show_default=False, help="Its unit, such as m."),
 )
 """Names and units of the plant's input and output, which model.json and what is made of it keep."""
 
@@ -165,6 +162,7 @@ signal_options = together(
     type=OUTPUT_FILE,
     help="Keep the responses as they were fitted in this .npz, to be given as a SWEEP later.",
 )
+@click.option("--figure", type=FIGURE_FILE, help="Draw the tests and the model as a Bode diagram: .pdf, .svg or .png.")
 @reading_options
 @fit_options
 @signal_options
@@ -185,6 +183,7 @@ def fit(
     output_name: str,
     output_unit: str,
     responses: Path | None,
+    figure: Path | None,
     **reading: Any,
 ) -> None:
     """Fit gain, integrators, modes, real roots and dead time to SWEEP files (raw records or frequency responses)."""
@@ -199,7 +198,7 @@ def fit(
     from identification.sweeps.read_sweeps import input_files, read_sweeps
 
     files = input_files(sweeps)
-    require_writable(output, *([] if responses is None else [responses]), inputs=files)
+    require_writable(*(path for path in (output, responses, figure) if path is not None), inputs=files)
     signals = Signals(input_name, input_unit, output_name, output_unit)
     tests = read_sweeps(sweeps, Reading(**{k: v for k, v in reading.items() if v is not None}))
     with tqdm(desc="fits", unit="", disable=None, leave=False) as bar:
@@ -221,6 +220,11 @@ def fit(
     writers: dict[Path, Callable[[Path], object]] = {output: lambda path: path.write_text(text, encoding="utf-8")}
     if responses is not None:
         writers[responses] = lambda path: write_responses(path, fitted.tests)
+    if figure is not None:
+        from paper_figures.look.bode import plot_bode
+        from paper_figures.look.style import figure_writer
+
+        writers[figure] = figure_writer(plot_bode(fitted.model, fitted.tests))
     write_whole(writers, inputs=files)
     bound = [bound_text(fitted.model.additive_bound), *bound_remarks(fitted.bound_fit)]
     of_tests = [f"{test.name}: {said}" for test in fitted.record.tests for said in (*test.remarks, *test.left_out)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,20 @@ def test_a_reference_from_a_file(command: str, design_json: Path, reference_csv:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
+def test_a_constant_is_its_amplitude_and_never_0_by_its_phase(
+    command: str, extended_design: Design, design_json: Path
+) -> None:
+    constant = replace(extended_design, reference_omegas=(0.0, 1.5))
+    design_json.write_text(constant.to_json(), encoding="utf-8")
+    asked = ["--amplitude", "3", "--amplitude", "0"]
+    zero = invoke(command, design_json, *asked, "--phase", "0", "--phase", "0")
+    refused(
+        zero, design_json, "frequency 0 has the phase 0, with which it is 0 at all times", "expected the phase pi/2"
+    )
+    assert set(written(invoke(command, design_json, *asked), design_json)["reference"]) == {3.0}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
 def test_a_ramp(command: str, design_json: Path) -> None:
     table = written(invoke(command, design_json, "--slope", "2", "--amplitude", "0", "--offset", "0.5"), design_json)
     np.testing.assert_allclose(table["reference"], 0.5 + 2 * table["time_s"], atol=1e-9)
@@ -98,7 +113,7 @@ def test_files_that_are_no_reference_and_what_is_read_is_not_written(
 
 
 def test_sampled_writes_the_run(extended_design: Design, design_json: Path) -> None:
-    drive = ["--quantum", "0.01", "--slew", "500", "--input-delay", "0.001", "--plant", "table", "--phase", "1"]
+    drive = ["--quantum", "0.01", "--rate-limit", "500", "--input-delay", "0.001", "--plant", "table", "--phase", "1"]
     result = invoke("sampled", design_json, *drive, "--amplitude", "30")
     table = written(result, design_json)
     assert list(table) == ["time_s", "reference", "output", "error", "control", "saturated_control"]
@@ -138,7 +153,7 @@ def test_sampled_without_limits(design_json: Path) -> None:
         (["--until", "0.001"], "expected a finite time of one sample"),
         (["--limit", "-1"], "--limit is -1"),
         (["--quantum", "-1"], "the quantum is -1"),
-        (["--slew", "0"], "the slew is 0"),
+        (["--rate-limit", "0"], "the rate limit is 0"),
         (["--input-delay", "-1"], "the input delay is -1 s"),
         (["--method", "euler"], "euler"),
         (["--amplitude", "nan"], "expected finite numbers"),
