@@ -70,10 +70,11 @@ def _of_sweep(found: ModelCheck, sweep: SweepCheck) -> Iterator[Answer]:
         rest = ("parameters", "margins", "guarantee") if found.promise else ("parameters",)
         yield from (answer(question, Outcome.OPEN, "no plant was fitted to the sweep") for question in rest)
         return
-    yield answer("within W_a", *_bound(found, (sweep.at_lines, sweep.between_lines)))
+    bound = _bound(found, (sweep.at_lines, sweep.between_lines))
+    yield answer("within W_a", *bound)
     yield answer("parameters", *_parameters(sweep.moves, found.share))
     if found.promise is not None and sweep.design is not None:
-        yield answer("margins", *_margins(found.promise, sweep.design))
+        yield answer("margins", *_margins(found.promise, sweep.design, bound[0] is Outcome.HOLDS))
         yield answer("guarantee", *_guarantee(found.promise, sweep.design))
 
 
@@ -83,11 +84,14 @@ def _bound(found: ModelCheck, looked: Sequence[Reach]) -> tuple[Outcome, str]:
     distance, bound = told_apart(worst.distance, worst.bound, 3, lambda value, digits: f"{value:.{digits}g}{unit}")
     where = f"at {worst.omega / (2 * pi):.4g} Hz"
     if worst.chance < found.share / len(looked):
-        return Outcome.MOVED, f"it leaves W_a {where}: {distance} from the model, where W_a is {bound}"
+        return Outcome.MOVED, f"the sweep leaves W_a {where}: it is {distance} from the model, where W_a is {bound}"
     if worst.distance > worst.bound:
-        said = f"{distance} from the model {where}, where W_a is {bound}, which its noise explains"
-        return Outcome.HOLDS, f"it lies within W_a: {said}"
-    return Outcome.HOLDS, f"it lies within W_a, and takes {worst.ratio:.2g} of it at most, {where}"
+        said = f"it is {distance} from the model {where}, where W_a is {bound}, and its noise explains the difference"
+        return Outcome.HOLDS, f"the sweep lies within W_a: {said}"
+    return (
+        Outcome.HOLDS,
+        f"the sweep lies within W_a: its distance from the model is at most {worst.ratio:.2g} of W_a, {where}",
+    )
 
 
 def _parameters(moves: Sequence[Move] | None, share: float) -> tuple[Outcome, str]:
@@ -95,14 +99,18 @@ def _parameters(moves: Sequence[Move] | None, share: float) -> tuple[Outcome, st
         return Outcome.OPEN, "the model does not say how sure its parameters are, so that only W_a was compared"
     largest = sorted(moves, key=lambda move: move.chance)
     moved = [move for move in largest if move.chance < share]
-    if not moved:
-        first = largest[0]
-        return Outcome.HOLDS, f"none moved by more than chance; {_named(first.parameter)} {_by(first)} comes nearest"
-    words = ", ".join([f"{_named(moved[0].parameter)} moved {_by(moved[0])}", *map(_also, moved[1:NAMED])])
-    return Outcome.MOVED, words + (f", and {len(moved) - NAMED} more" if len(moved) > NAMED else "")
+    untold = sum(not move.could_be_told for move in moves)
+    if moved:
+        words = ", ".join([f"{named(moved[0].parameter)} moved {_by(moved[0])}", *map(_also, moved[1:NAMED])])
+        return Outcome.MOVED, words + (f", and {len(moved) - NAMED} more" if len(moved) > NAMED else "")
+    if untold == len(moves):
+        return Outcome.OPEN, "the model's tests differ too much, or the sweep is too noisy, to tell a move of any"
+    rest = f"; of {untold} no move could be told" if untold else ""
+    first = largest[0]
+    return Outcome.HOLDS, f"none moved by more than chance; {_also(first)} comes nearest{rest}"
 
 
-def _named(parameter: Parameter) -> str:
+def named(parameter: Parameter) -> str:
     """A parameter in a sentence."""
     if parameter.quantity:
         quantity = {"omega": "frequency", "zeta": "damping"}[parameter.quantity]
@@ -116,23 +124,32 @@ def _by(move: Move) -> str:
     """How far it moved, in percent and in standard errors."""
     if move.errors == inf:
         return "to the other sign"
-    how = f"by {100 * move.share:+.2g} %" if move.parameter.value else f"from 0 to {1e3 * move.value:.3g} ms"
-    return f"{how} ({abs(move.errors):.2g} standard errors)"
+    how = f"by {relative(move.share)}" if move.parameter.value else f"from 0 to {1e3 * move.value:.3g} ms"
+    return f"{how} ({abs(move.errors):.3g} standard errors)"
+
+
+def relative(share: float) -> str:
+    """A share in percent with its sign, in two digits or in whole numbers."""
+    percent = 100 * share
+    return f"{percent:+.2g} %" if abs(percent) < 99.5 else f"{percent:+.0f} %"
 
 
 def _also(move: Move) -> str:
-    return f"{_named(move.parameter)} {_by(move)}"
+    return f"{named(move.parameter)} {_by(move)}"
 
 
-def _margins(promised: Promise, on_plant: OnPlant) -> tuple[Outcome, str]:
+def _margins(promised: Promise, on_plant: OnPlant, is_within: bool) -> tuple[Outcome, str]:
     before, after = promised.margins, on_plant.margins
     if not isinstance(before, Margins):
         return Outcome.OPEN, f"the design has none with its own model: {before}"
     if not isinstance(after, Margins):
         return Outcome.MOVED, f"the loop is NOT stable with the new plant: {after}"
     new, old = told_apart(after.modulus.value, before.modulus.value, 3, lambda value, digits: f"{value:.{digits}g}")
-    least = f"; every plant within W_a leaves {promised.modulus:.3g}" if promised.modulus else ""
-    said = f"the modulus margin is {new}, {old} with the model{least}"
+    robust = f"|W_a C S| reaches {before.W_a_C_S.value:.3g} and promises nothing"
+    if promised.modulus:
+        robust = f"|W_a C S| leaves {promised.modulus:.3g} to every plant within W_a"
+        robust += "" if is_within else ", and promises nothing to this one"
+    said = f"the modulus margin is {new}, {old} with the model; {robust}"
     if after.modulus.value < (1 - LOST) * promised.modulus:
         return Outcome.MOVED, f"the loop is stable, but {said}"
     return Outcome.HOLDS, f"the loop is stable, and {said}"
@@ -145,7 +162,7 @@ def _guarantee(promised: Promise, on_plant: OnPlant) -> tuple[Outcome, str]:
         return Outcome.MOVED, "nothing is guaranteed of a loop that is not stable"
     found, asked = told_apart(on_plant.sector, promised.sector, 3, sector_text)
     if on_plant.sector < (1 - LOST) * promised.sector:
-        lost = "that windup ends whatever the control" if promised.sector >= 1 else f"the sector {asked}"
+        lost = "an end of windup whatever the control" if promised.sector >= 1 else f"the sector {asked}"
         return Outcome.MOVED, f"{lost} is NOT guaranteed with the new plant: the circle criterion gives {found}"
     if promised.sector >= 1:
         return Outcome.HOLDS, "windup ends whatever the control with the new plant too (found on a grid, not proved)"

@@ -69,9 +69,7 @@ class ModelCheck:
         return LEVEL / (2 * len(self.sweeps))
 
 
-def check_model(
-    model: IdentifiedModel, tests: Sequence[FrequencyResponse], design: Design | None = None
-) -> ModelCheck:
+def check_model(model: IdentifiedModel, tests: Sequence[FrequencyResponse], design: Design | None = None) -> ModelCheck:
     """Compare new sweeps of a plant with its model, and see what a design has on the plant as it is now.
 
     Parameters

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from experiments.checking.answers import Outcome, answers
 from experiments.checking.check_model import ModelCheck
-from experiments.checking.words import describe, first_sentence, rows
+from experiments.checking.words import describe, first_sentence, tables
 from identification.base.errors import printable
 
 SUITE = "antiwindup check"
@@ -49,8 +49,9 @@ def markdown(found: ModelCheck) -> str:
     ]
     lines = [f"**{_escaped(first_sentence(found))}.**", "", *_table(("sweep", "question", "answer", "why"), given)]
     for sweep in found.sweeps:
-        if table := rows(sweep.moves or (), found.share):
-            lines += ["", _escaped(describe(sweep)), "", *_table(table[0], table[1:])]
+        lines += ["", _escaped(describe(sweep))]
+        for head, *body in tables(found, sweep):
+            lines += ["", *_table(head, body)]
     return "\n".join(lines) + "\n"
 
 

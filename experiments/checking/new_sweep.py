@@ -107,4 +107,10 @@ def fitted(model: IdentifiedModel, test: FrequencyResponse) -> NewSweep | str:
         fit = fit_same_structure(test, structure, model.plant, soft=soft)
     except Misfit as error:
         return str(error)
+    except Undetermined:
+        low, high = test.omega[[0, -1]] / (2 * np.pi)
+        raise InputError(
+            f"{test.name}: its {test.omega.size} lines from {low:.6g} to {high:.6g} Hz do not determine a plant with "
+            f"{structure}; expected lines wherever the model was measured"
+        ) from None
     return NewSweep(alias_free(test, fit.plant), fit, sureness(fit, test))

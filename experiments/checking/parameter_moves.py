@@ -14,6 +14,8 @@ from identification.model.fit_record import FitRecord
 from identification.model.model_file import IdentifiedModel
 from identification.model.parameter import Parameter
 
+TOLD = 9.0  # relative move beyond which nothing is said of a parameter
+
 
 @dataclass(frozen=True)
 class Move:
@@ -26,10 +28,10 @@ class Move:
     value
         The new sweep's, in the same unit.
     errors
-        The difference over its standard error: of logarithms, but for the dead time; infinite where the gain has changed
-        its sign.
+        The difference over its standard error: of logarithms, but for the dead time; infinite where the gain has
+        changed its sign.
     chance
-        Probability of a difference as large where nothing moved, times the number of parameters (Bonferroni), at most 1.
+        Probability of a difference as large where nothing moved, times the number of parameters (Bonferroni), or 1.
     found_from
         Relative move from which it would have been found; of a dead time that the model has not, in seconds.
     """
@@ -39,6 +41,11 @@ class Move:
     errors: float
     chance: float
     found_from: float
+
+    @property
+    def could_be_told(self) -> bool:
+        """Whether a move to ten times its value would have been found."""
+        return self.parameter.value == 0 or self.found_from < TOLD
 
     @property
     def share(self) -> float:
@@ -83,8 +90,8 @@ def moves(model: IdentifiedModel, record: FitRecord, sweep: NewSweep, level: flo
         parts.append((noise**2, count * sure.freedom))
     lines = sum(2 * test.lines - structure.free - NOISE for test in record.tests)
     parts.append((misfit**2, np.full(own.size, float(max(1, lines)))))
-    variance = np.maximum(sum(part for part, _ in parts), np.finfo(float).tiny)
-    freedom = variance**2 / np.maximum(sum(part**2 / nu for part, nu in parts), np.finfo(float).tiny)
+    variance = np.sum([part for part, _ in parts], axis=0)
+    freedom = variance**2 / np.sum([part**2 / nu for part, nu in parts], axis=0)
     errors = (after - before) / np.sqrt(variance)
     if fit.sign != np.sign(model.plant.gain):
         errors[0] = np.inf

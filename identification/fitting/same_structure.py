@@ -1,4 +1,4 @@
-"""One test -> its likeliest plant of a structure that is known, from a plant that is near and from no starting point."""
+"""One test -> its likeliest plant of a known structure, from a plant that is near and from no starting point."""
 
 from __future__ import annotations
 

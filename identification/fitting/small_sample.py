@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.base.arrays import Real
+from identification.base.arrays import Complex, Real
 from identification.fitting.least_squares import log_jacobian, response_of, stacked
 from identification.fitting.likelihood import noise_levels
 from identification.fitting.one_fit import OneFit
@@ -76,7 +76,7 @@ def sureness(fit: OneFit, test: FrequencyResponse) -> Sureness:
     return Sureness(covariance, np.append(freedom, [np.inf] * (structure.size - size)), np.sqrt(variance))
 
 
-def _inverted(derivatives: np.ndarray, variance: Real) -> tuple[Real, Real, Real]:
+def _inverted(derivatives: Complex, variance: Real) -> tuple[Real, Real, Real]:
     """The rows (p, 2M) over the noise in units (p,) in which their squares add up to 1, and the inverse (p, p)."""
     rows = stacked(derivatives / np.sqrt(variance)[:, None])
     units = 1 / np.sqrt(np.sum(rows**2, axis=1))

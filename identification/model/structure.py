@@ -64,8 +64,8 @@ class Structure:
         left = len(plant.zero_modes) - right[0], len(plant.real_zeros) - right[1]
         sides = left, right, (len(plant.pole_modes), len(plant.real_poles))
         zeros, zeros_right, poles = (2 * modes + rates for modes, rates in sides)
-        pairs = tuple(rates // 2 for _, rates in sides)
-        return cls(plant.integrators, zeros, poles, zeros_right, delayed, pairs)
+        pairs = [rates // 2 for _, rates in sides]
+        return cls(plant.integrators, zeros, poles, zeros_right, delayed, (pairs[0], pairs[1], pairs[2]))
 
     def theta(self, plant: PlantModel) -> Real:
         """Theta (size,) of a plant of this structure; modes sorted by omega and real roots by rate, each kind apart."""
