@@ -14,12 +14,12 @@ import click
 from identification.base.command_line import CommandGroup
 
 COMMANDS = {"new": "new_command"} | dict.fromkeys(("refit", "figures", "report"), "commands")
-"""Command -> its module in this package."""
+"""Command of this package -> its module."""
 ROOMS = ("identification", "design", "experiments", "paper_figures")
 
 
 class Rooms(CommandGroup):
-    """The commands of this package, and the groups of the rooms, each with its room's name and first line."""
+    """The commands of this package, and the groups of the rooms, each under its room's name and with its first line."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return [*COMMANDS, *ROOMS]
@@ -34,10 +34,10 @@ class Rooms(CommandGroup):
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Builds"):
-            own = {name: self.get_command(ctx, name) for name in COMMANDS}
+        own = {name: self.get_command(ctx, name) for name in COMMANDS}
+        with formatter.section("From the bench to the drive"):
             formatter.write_dl([(name, each.get_short_help_str(90)) for name, each in own.items() if each])
-        with formatter.section("Commands"):
+        with formatter.section("Step by step"):
             formatter.write_dl([(room, str(import_module(room).__doc__).splitlines()[0]) for room in ROOMS])
 
 

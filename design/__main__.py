@@ -139,7 +139,9 @@ def delay_free(
 @click.option("--a", type=float, help="Closed-loop pole of the free part, rad/s; as fast as W_a allows unless given.")
 @click.option("--e", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
 @click.option("--f", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
-@click.option("--method", type=click.Choice(METHODS), default="zeros", help="How Q is designed.")
+@click.option(
+    "--interpolation", "method", type=click.Choice(METHODS), default="zeros", help="How Q is made to interpolate."
+)
 @click.option("--inverse-epsilon", type=float, default=0.0, help="Of R_eps^-1 = R_0^-1/(1 + eps s)^2 (3.2), s.")
 @click.option(
     "--robust-level",

@@ -16,6 +16,7 @@ from experiments.campaign.checkpoint import CampaignFile
 from experiments.campaign.distributions import PERCENT, RUNS, campaign_tables
 from experiments.campaign.run_plants import Campaign, code_sha256
 from experiments.campaign.workers import run_here, run_on_cluster
+from experiments.engine.simulate import limits_text
 from experiments.runs.guarantee import sector_text
 from experiments.runs.references import Reference
 from identification.base import process
@@ -72,9 +73,9 @@ def run_campaign(
         click.echo(f"{there} of {plants} plants were there already")
     summary = campaign_tables(output)["campaign_summary"]
     click.echo(_promised(summary))
-    low, high = limits
-    said = f"+-{high:.6g}" if low == -high else f"{low:.6g} to {high:.6g}"
-    click.echo(f"{plants} plants within W_a -> {output}; limits {said}, {campaign.horizon_s:.6g} s each")
+    click.echo(
+        f"{plants} plants within W_a -> {output}; limits {limits_text(*limits)}, {campaign.horizon_s:.6g} s each"
+    )
     for line in _lines(summary):
         click.echo(line)
 

@@ -140,7 +140,7 @@ def test_design_refuses_bad_plants(runner: CliRunner, tmp_path: Path, member: st
                 "2",
                 "--f",
                 "1",
-                "--method",
+                "--interpolation",
                 "poles",
             ],
             "unstable poles",
@@ -173,7 +173,7 @@ def test_integral_action_hides_no_integrator(runner: CliRunner, tmp_path: Path) 
         assert ("C hides the integrator of the plant" in result.output) == (option is EPSILON)
         written[option[0]] = read_design(output)
     for name, design in written.items():
-        assert design.reference_omegas == (2 * math.pi / 4, 2 * math.pi / 1.5)
+        assert design.reference_omegas == (math.tau * 0.25, math.tau * 0.7)
         C = design.controller_parts()[0]
         assert (0 in C.zeros, 0 in C.poles) == ((True, False) if name == "--epsilon" else (False, True))
 
