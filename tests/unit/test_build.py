@@ -183,7 +183,7 @@ def test_a_refused_experiment_leaves_its_design(refit: Refit, behaviour: dict[st
 
 
 def test_a_crash_is_no_refusal(refit: Refit, behaviour: dict[str, str], tmp_path: Path) -> None:
-    behaviour["design delay_free"] = "crashes"
+    behaviour["design delay free"] = "crashes"
     with pytest.raises(Crash, match="Traceback of it"):
         refit()
     assert "summary.pdf" not in built(tmp_path)
@@ -200,6 +200,68 @@ def test_a_refused_fit_stops_everything_and_nothing_old_stays(
     with pytest.raises(InputError, match=r"^fit will not$"):
         refit("refit", fit=("--modes", "1"))
     assert set(built(tmp_path)) == set()
+
+
+@pytest.fixture
+def begun(refit: Refit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, set[str]]]:
+    """The last word but one of each command that is started, and the files that are there by then."""
+    found: list[tuple[str, set[str]]] = []
+    start = antiwindup.build.start
+
+    def noted(command: Sequence[str], log: Path, journal: Path) -> object:
+        found.append((command[1], {name for name in built(tmp_path) if "partial" not in name}))
+        return start(command, log, journal)
+
+    monkeypatch.setattr(antiwindup.build, "start", noted)
+    return found
+
+
+def test_the_page_comes_first_and_again_with_what_is_done(
+    refit: Refit, begun: list[tuple[str, set[str]]], tmp_path: Path
+) -> None:
+    refit()
+    pages = [there for name, there in begun if name == "summary"]
+    assert [name for name, _ in begun][:2] == ["fit", "summary"]
+    assert [{"design.json", "results/tracking.csv", "results/campaign.csv"} & there for there in pages] == [
+        set(),
+        {"design.json", "results/tracking.csv"},
+        {"design.json", "results/tracking.csv", "results/campaign.csv"},
+    ]
+    begun.clear()
+    refit()
+    assert begun == []
+
+
+def test_a_first_page_does_not_stand_beside_what_was_made_of_other_sweeps(
+    refit: Refit, begun: list[tuple[str, set[str]]], tmp_path: Path
+) -> None:
+    refit()
+    begun.clear()
+    (tmp_path / "a.csv").write_text("b", encoding="utf-8")
+    refit()
+    first = next(there for name, there in begun if name == "summary")
+    assert not {"design.json", "axis.toml", "results/campaign.csv", "figures/bode.pdf"} & first
+    changed = built(tmp_path)
+    (tmp_path / "mine").rename(tmp_path / "before")
+    refit()
+    assert built(tmp_path) == changed
+
+
+@pytest.mark.parametrize("stopped", ["bode", "tracking", "campaign"])
+def test_a_build_that_was_stopped_between_two_pages_goes_on(
+    refit: Refit, begun: list[tuple[str, set[str]]], behaviour: dict[str, str], tmp_path: Path, stopped: str
+) -> None:
+    behaviour[stopped] = "crashes"
+    with pytest.raises(Crash):
+        refit()
+    behaviour.clear()
+    begun.clear()
+    refit()
+    ours = built(tmp_path)
+    assert "fit" not in {name for name, _ in begun}
+    (tmp_path / "mine").rename(tmp_path / "before")
+    refit()
+    assert built(tmp_path) == ours
 
 
 def test_figures_fail_when_a_design_refuses(refit: Refit, behaviour: dict[str, str], tmp_path: Path) -> None:
@@ -473,7 +535,7 @@ SWEEP = Path(__file__).resolve().parents[2] / "data" / "elevation" / "synthetic_
         (["refit", "nowhere.csv", "--output", "mine"], "nowhere.csv: no such file"),
         (["refit", ".", "--output", "mine"], ".: holds no file that ends in .csv"),
         (["refit", str(SWEEP), "--output", "file"], "file: cannot be made (File exists)"),
-        (["refit", str(SWEEP), "--output", "mine", "--limit", "nan"], "--limit is nan; expected a positive number"),
+        (["refit", str(SWEEP), "--output", "mine", "--limit", "nan"], "--limit is [nan]; expected [low, high]"),
         (["figures", str(SWEEP), "--output", "mine", "--model", "nowhere.json"], "nowhere.json: no such file"),
         (["report", str(SWEEP), "--output", "mine", "--model", "nothing"], "nothing"),
         (["figures", str(SWEEP), "--output", "mine", "--only", "fig_9"], "--only is 'fig_9'; expected one of fig_2_01"),
