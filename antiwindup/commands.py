@@ -56,7 +56,7 @@ def refit(sweeps: tuple[str, ...], **options: Any) -> None:
     A second run does what has changed since, and nothing of yours is replaced or removed. Designs and simulations that
     refuse the plant stop only what needs them.
     """
-    from antiwindup.steps import refit_steps
+    from antiwindup.refit_steps import refit_steps
 
     of_axis = {name: options.pop(name) for name in list(options) if name.replace("_", "-") in KEYS}
     given = given_keys({name: value for name, value in of_axis.items() if _is_given(name)})
@@ -80,7 +80,7 @@ def refit(sweeps: tuple[str, ...], **options: Any) -> None:
 @build_options
 def figures(sweeps: tuple[str, ...], model: str | None, only: tuple[str, ...], **options: Any) -> None:
     """Draw the figures of the thesis, and ours, from SWEEP files."""
-    from antiwindup.steps import report_steps, thesis_steps
+    from antiwindup.thesis_steps import report_steps, thesis_steps
 
     asked, how = _asked(sweeps, model, **options)
     steps = thesis_steps(asked)
@@ -98,7 +98,7 @@ def figures(sweeps: tuple[str, ...], model: str | None, only: tuple[str, ...], *
 @build_options
 def report(sweeps: tuple[str, ...], model: str | None, **options: Any) -> None:
     """Put the figures with their data, every verdict on the thesis, the fit and the audits on one page of HTML."""
-    from antiwindup.steps import report_steps, thesis_steps
+    from antiwindup.thesis_steps import report_steps, thesis_steps
 
     asked, how = _asked(sweeps, model, **options)
     steps = thesis_steps(asked)

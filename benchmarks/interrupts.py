@@ -40,6 +40,8 @@ COMMANDS = {
         *["--epsilon", "1e-4", "--output", "{folder}/d.json"],
     ],
     "audit": ["design", "audit", "{extended}"],
+    "new": ["antiwindup", "new", "{folder}/axis.toml"],
+    "axis": ["experiments", "axis", "implied", "--reference-hz", "0.5", "--output", "{folder}"],
     "simulate": [
         *["experiments", "simulate", *RUN, "--until", "9000", "--sample-time", "0.01", "--output", "{folder}/r.csv"],
     ],
@@ -59,10 +61,15 @@ COMMANDS = {
     "bode": ["paper_figures", "bode", "{model}", *SWEEPS, "--output", "{folder}"],
     "summary": ["paper_figures", "summary", "{model}", *SWEEPS, "--build", "{folder}"],
     "report": ["paper_figures", "report", "implied", *SWEEPS, "--build", "{folder}"],
+    "export": [
+        *["antiwindup", "export", "{extended}", "--to", "c", "--rate", "2000", "--limit", "12", "--output", "{folder}"],
+    ],
+    "explore": ["antiwindup", "explore", "{extended}", "--no-browser", "--output", "{folder}/d.json"],
     "refit": ["antiwindup", "refit", *SWEEPS, "--output", "{folder}/built"],
 }  # fmt: skip
 FILES = {
     "fit": 2,
+    "axis": 2,
     "limits": 2,
     "compare": 2,
     "interpolation": 3,
@@ -70,6 +77,7 @@ FILES = {
     "draw": 4,
     "bode": 4,
     "summary": 4,
+    "export": 4,
 }  # others one
 
 KEPT = ("c.parquet.parts/", "built/")  # so that the same command goes on

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from design.choices import GUARANTEES
 from experiments.options import reference_options
 from experiments.pair_options import NumberPair, PairCommand
 from identification.base.axis_file import KEYS
@@ -20,9 +21,10 @@ axis_options = together(
     reference_options,
     click.option("--limit", type=NumberPair(), metavar="[LOW] HIGH", help=KEYS["limit"].comment),
     *(
-        click.option(f"--{name}", type=str if "|" in KEYS[name].kind else float, help=KEYS[name].comment)
-        for name in ("rate-limit", "rate", "quantum", "robust-level", "guarantee", "recovery")
+        click.option(f"--{name}", type=float, help=KEYS[name].comment)
+        for name in ("rate-limit", "rate", "quantum", "robust-level", "recovery")
     ),
+    click.option("--guarantee", type=click.Choice(GUARANTEES), help=KEYS["guarantee"].comment),
 )
 """What is said of an axis, but for the names of its signals, which the model has."""
 

@@ -189,7 +189,7 @@ def simulate_sampled(
             f"the run lasts {until_s:g} s; expected a finite time of one sample, {1 / drive.rate_hz:g} s, at least"
         )
     series = _series(design.loop_plant if plant is None else plant, drive, until_s, disturbances.input)
-    controller = _controller(design, design.chosen(anti_windup), drive, form)
+    controller = controller_blocks(design, design.chosen(anti_windup), drive, form)
     time_s = instants(drive.rate_hz, until_s)
     r, output, noise = reference(time_s), disturbances.output, disturbances.noise
     seen = r - disturbances.seen(time_s)
@@ -232,7 +232,7 @@ def _series(plant: PlantModel, drive: Drive, until_s: float, disturbance: Signal
     return Series(A, b, c, through, norm, whole, read, knots - ahead_s, pieces, early, ahead, into)
 
 
-def _controller(
+def controller_blocks(
     design: Design, anti_windup: AntiWindup | None, drive: Drive, form: str
 ) -> tuple[SampledBlock, SampledBlock, SampledBlock, float]:
     """What makes v of e, and of v; theta1~, and theta2 behind its dead time; what v takes of itself at once."""

@@ -105,7 +105,8 @@ class Key:
         read, expected = READERS.get(self.kind, (lambda word: word if word in words else None, f"one of {words}"))
         found = read(value)
         if found is None:
-            raise InputError(f"{place} is {shown(value)}; expected {expected}")
+            seen = list(value) if isinstance(value, tuple) else value
+            raise InputError(f"{place} is {shown(seen)}; expected {expected}")
         return found
 
 

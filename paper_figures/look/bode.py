@@ -40,7 +40,7 @@ TOUCH: dict[str, Any] = {
     "markerfacecolor": "none",
 }
 POINTS = 3000  # of a line
-MOST_DOTS = 20_000  # of a test; of more lines the extremes of so many pieces are drawn
+MOST_DOTS = 20_000  # of a test; of more lines as many are drawn, and the extremes among them
 SPARSE = 60  # lines of a test up to which they are drawn as dots of a size that is seen
 BEYOND = 10.0  # times the slowest and the fastest root of a plant without tests is drawn
 TURNS_DEG = (5, 10, 15, 30, 45, 90, 180, 360, 720, 1440)  # from one tick of a phase to the next
@@ -240,10 +240,14 @@ def _dots(test: FrequencyResponse) -> dict[str, Any]:
 
 
 def _thinned(omega: Real, values: Real) -> tuple[Real, Real]:
-    """Frequencies in Hz and values of a test's lines, of very many the extremes."""
+    """Frequencies in Hz and values of a test's lines; of very many some, and the extremes."""
     seen = np.isfinite(values)
     omega, values = omega[seen], values[seen]
-    return envelope(hertz(omega), values, MOST_DOTS, along=np.log(omega))
+    if omega.size <= MOST_DOTS:
+        return hertz(omega), values
+    step = -(-2 * omega.size // MOST_DOTS)
+    extremes, most = envelope(omega, values, MOST_DOTS // 2, along=np.log(omega))
+    return hertz(np.append(omega[::step], extremes)), np.append(values[::step], most)
 
 
 def _leave_out_least(panel: Axes, values: Sequence[Real]) -> None:

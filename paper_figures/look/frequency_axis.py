@@ -41,6 +41,11 @@ def decibel_of(quantity: str, unit: str) -> str:
     return f"{quantity} [dB re {plain(unit)}]" if unit else f"{quantity} [dB]"
 
 
+def number(value: float) -> str:
+    """A number of three digits, without an exponent up to a million."""
+    return f"{float(f'{value:.3g}'):g}"
+
+
 def plain(text: str) -> str:
     """A name or a unit that somebody gave, as it is to be printed: no part of it is a formula."""
     return text.replace("$", r"\$")

@@ -15,6 +15,7 @@ from matplotlib.patches import Circle
 from design.design_file import Design
 from identification.base.arrays import Complex, Real
 from identification.model.plant import PlantModel
+from paper_figures.look.frequency_axis import number
 from paper_figures.look.loop_curves import LoopCurves, lowest, traced
 from paper_figures.look.panels import ABOVE
 from paper_figures.look.style import styled
@@ -86,18 +87,16 @@ def draw_nyquist(panel: Axes, design: Design, plant: PlantModel | None = None) -
     omega, points = traced(curves.open, grid)
     modulus = lowest(lambda at: 1 / curves.magnitudes(at)[0], grid)[1]
     view = _view(points, modulus)
-    side = max(view[1] - view[0], view[3] - view[2])
+    side = view[1] - view[0]
     at = omega[_spread(points, curves.radius(omega), view, STEP * side)]
     _discs(panel, curves.open(at), curves.radius(at))
     nearest, least = lowest(lambda at: 1 / curves.magnitudes(at)[2], grid)
     centre = curves.open(np.array([nearest]))[0]
     if np.isfinite(centre):
-        said = rf"$\|W_a C S\|$ = {1 / least:.3g}, at {nearest / tau:.3g} Hz"
-        panel.add_patch(
-            Circle((centre.real, centre.imag), float(curves.radius(np.array([nearest]))[0]), label=said, **WORST)
-        )
-    panel.add_patch(Circle((-1, 0), modulus, label=rf"$1/\|S\|$ = {modulus:.3g}", **MARGIN))
-    panel.add_patch(Circle((0, 0), 1, **UNIT))
+        said = rf"$\|W_a C S\|$ = {1 / least:.3g}, at {number(nearest / tau)} Hz"
+        _circle(panel, centre, float(curves.radius(np.array([nearest]))[0]), WORST, said)
+    _circle(panel, -1, modulus, MARGIN, rf"$1/\|S\|$ = {modulus:.3g}")
+    _circle(panel, 0, 1, UNIT)
     panel.plot(points.real, points.imag, **LOOP, label=r"$L = P\,C$")
     if plant is not None:
         true = LoopCurves.of(design, plant)
@@ -119,11 +118,13 @@ def _circle(panel: Axes, centre: complex, radius: float, line: dict[str, Any], l
 
 
 def _view(points: Complex, modulus: float) -> tuple[float, float, float, float]:
-    """Left, right, bottom and top: the curve up to SHOWN, the circle around -1, and LEAST."""
+    """Left, right, bottom and top of a square: it holds the curve up to SHOWN, the circle around -1, and LEAST."""
     near = points[np.abs(points) <= SHOWN]
     x = [*near.real, -1.1 - modulus, LEAST[0], LEAST[1]]
     y = [*near.imag, 1.1 * modulus, -1.1 * modulus, LEAST[2], LEAST[3]]
-    return min(x), max(x), min(y), max(y)
+    side = max(max(x) - min(x), max(y) - min(y)) / 2
+    middle_x, middle_y = (min(x) + max(x)) / 2, (min(y) + max(y)) / 2
+    return middle_x - side, middle_x + side, middle_y - side, middle_y + side
 
 
 def _inside(points: Complex, view: Sequence[float]) -> np.ndarray:
@@ -169,7 +170,7 @@ def _frequencies(panel: Axes, curves: LoopCurves, omega: Real, points: Complex, 
         across *= 1 if (across * np.conj(here)).real > 0 else -1  # away from 0
         panel.plot([here.real], [here.imag], color="#000000", marker="o", markersize=2.8)
         panel.annotate(
-            f"{hertz:g}" + ("" if len(taken) > 3 else " Hz"),
+            number(hertz) + ("" if len(taken) > 3 else " Hz"),
             (here.real, here.imag),
             (5 * across.real, 5 * across.imag),
             textcoords="offset points",

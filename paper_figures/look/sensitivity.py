@@ -80,27 +80,25 @@ def draw_sensitivity(panel: Axes, design: Design, plant: PlantModel | None = Non
     top = USUAL
     for k, ((name, line), values) in enumerate(zip(LINES, magnitudes, strict=True)):
         peak = 1 / lowest(lambda at, k=k: 1 / curves.magnitudes(at)[k], grid)[1]  # type: ignore[misc]
-        panel.plot(hertz(omega), np.maximum(values, DEPTH / 10), **line, label=rf"$|{name}|$, at most {peak:.3g}")
+        panel.plot(hertz(omega), np.maximum(values, DEPTH / 10), **line, label=rf"$|{name}|$, peak {peak:.3g}")
         top = max(top, peak)
     levels = {USUAL: f"{USUAL:g}", 1.0: "1"}
     roll_off = design.parameters.roll_off if isinstance(design.parameters, ExtendedParameters) else None
     if roll_off is not None:
-        levels[roll_off.level] = f"robust level {roll_off.level:g}"
+        levels[roll_off.level] = f"{roll_off.level:g} asked"
     for level in levels:
         panel.axhline(level, **LEVEL, linestyle="-" if level == 1 else (0, (1, 2)), zorder=1)
-    for i, at in enumerate(shown):
-        panel.axvline(at / tau, **REFERENCE, zorder=1, label=None if i else "reference")
-    if roll_off is not None:
         panel.annotate(
-            levels[roll_off.level],
-            (1, roll_off.level),
-            (-3, -2),
+            levels[level],
+            (1, level),
+            (3, 0),
             xycoords=("axes fraction", "data"),
             textcoords="offset points",
-            ha="right",
-            va="top",
+            va="center" if level == USUAL else ("bottom" if level == 1 else "top"),
             fontsize=7,
         )
+    for i, at in enumerate(shown):
+        panel.axvline(at / tau, **REFERENCE, zorder=1, label=None if i else "reference")
     panel.set_yscale("log")
     panel.set_ylim(max(DEPTH, min(float(np.nanmin(values)) for values in magnitudes) / 2), 1.5 * top)
     panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
