@@ -83,21 +83,21 @@ def axis_command(names: tuple[str, ...], build: Path, output: Path) -> None:
     help="Existing folder of the designs, with the tables in its folder results; to write to, too.",
 )
 def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
-    """Sum up MODEL, fitted to SWEEP files, its designs, and what was refused: summary.pdf, .svg, .png and .txt."""
+    """Say what to do with MODEL, fitted to SWEEP files, and what not, and why: summary.pdf, .svg, .png and .txt."""
     from identification.model.model_file import read_model
     from identification.sweeps.as_fitted import as_fitted
     from identification.sweeps.read_sweeps import read_sweeps
     from paper_figures.look import style
     from paper_figures.result_tables import sentences_of
     from paper_figures.summary import page
-    from paper_figures.summary.build_folder import read_build, summaries
+    from paper_figures.summary.build_folder import read_refit
     from paper_figures.summary.words import summarise
 
     identified = read_model(model)
     tests = as_fitted(identified, read_sweeps(sweeps))
-    designs, outcomes = read_build(build, "summary")
-    with sentences_of(summaries(outcomes), build / "results", "summary", model):
-        said = summarise(identified, tests, designs, outcomes)
+    found = read_refit(build)
+    with sentences_of(found.made, build / "results", "summary", model):
+        said = summarise(identified, tests, found)
         files = style.rendered(page.draw(said, identified, tests), build, "summary", said.text())
     style.write(files)
     click.echo(f"{len(tests)} test{'s' if len(tests) > 1 else ''} -> {build / 'summary.pdf'}")
@@ -143,8 +143,8 @@ def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
 def report_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
     """Put all that was made for MODEL (a model.json, table or implied) and SWEEP files on one page of HTML."""
     from paper_figures.result_tables import sentences_of
-    from paper_figures.summary.build_folder import read_build, summaries
     from paper_figures.thesis.figure_registry import figure_module, figure_names
+    from paper_figures.thesis.report.build_folder import read_build, summaries
     from paper_figures.thesis.report.content import report_content
     from paper_figures.thesis.report.html import write_report
     from paper_figures.thesis.report.inputs import read_inputs

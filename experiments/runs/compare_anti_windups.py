@@ -150,8 +150,8 @@ def tracking_summary(
         run, lower_limit, limit (the upper one), required, last_saturation_s (empty: saturated to the end), settling_s
         (error within 1 % of the reference's amplitude, measured from the lasting offset of the error; empty:
         never), offset and ripple (middle and half distance of the extremes of the error over the last period),
-        relative_error_percent (largest error of the last period over the reference's amplitude; empty where that is
-        0). A run that diverges
+        asked_control (the largest |u| of the samples), relative_error_percent (largest error of the last period over
+        the reference's amplitude; empty where that is 0). A run that diverges
         has empty cells. Then, of :mod:`experiments.runs.sector_promise`, guaranteed_sector (0: nothing is guaranteed),
         needed_sector (infinite where v_s reaches a limit), largest_control (the largest |u|) and covered_control (how
         large it may be wherever v_s is; empty too where nothing is guaranteed, or any size is covered), empty for a run
@@ -172,6 +172,7 @@ def tracking_summary(
                 "settling_s": settling_time(run.time_s, error - offset, SETTLED * reference.amplitude),
                 "offset": offset,
                 "ripple": ripple,
+                "asked_control": float(np.abs(run.control).max()),
                 "relative_error_percent": 100 * (abs(offset) + ripple) / (reference.amplitude or math.nan),
             }
             | _promised(verdicts.get(name))

@@ -14,9 +14,9 @@ from matplotlib.ticker import NullFormatter
 
 from design.design_file import Design
 from experiments.runs.compare_anti_windups import SETTLED
-from paper_figures.axis_figures.labels import KINDS, limits_said, look_of, with_unit
+from paper_figures.axis_figures.labels import KINDS, look_of
 from paper_figures.look import panels
-from paper_figures.look.captions import at_least, duration, only
+from paper_figures.look.captions import at_least, duration, limits_said, only, with_unit
 from paper_figures.look.style import FULL_WIDTH, LINES, styled
 
 TABLES: tuple[str, ...] = ("compare", "compare_runs")

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from design.design_file import Design
-from paper_figures.axis_figures.labels import KINDS, limits_said, look_of, united, with_unit
+from paper_figures.axis_figures.labels import KINDS, look_of, united
 from paper_figures.look import panels
-from paper_figures.look.captions import duration, number, of_run, only
+from paper_figures.look.captions import duration, limits_said, number, of_run, only, with_unit
 from paper_figures.look.style import FULL_WIDTH, LINES, styled
 
 TABLES: tuple[str, ...] = ("campaign", "campaign_summary", "campaign_distance")

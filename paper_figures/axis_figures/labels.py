@@ -1,10 +1,7 @@
-"""What the figures of an axis share: the words for its anti-windups, for its limits, and values with their units."""
+"""What the figures of an axis share: the words for its anti-windups and their lines, and labels with units."""
 
 from __future__ import annotations
 
-import pandas as pd
-
-from paper_figures.look.captions import number, of_limits
 from paper_figures.look.frequency_axis import plain
 
 KINDS = {
@@ -37,13 +34,3 @@ def look_of(run: str) -> str:
 def united(label: str, unit: str) -> str:
     """The label of an axis with the unit, where it is known."""
     return f"{label} [{plain(unit)}]" if unit else label
-
-
-def with_unit(value: float, unit: str, digits: int = 3) -> str:
-    """A value in words with its unit, where it is known."""
-    return f"{number(value, digits)} {unit}".rstrip()
-
-
-def limits_said(table: pd.DataFrame, unit: str) -> str:
-    """The limits of a table in words: ``+-12 A`` or ``-3 to 12 A``."""
-    return f"{of_limits(table)} {unit}".rstrip()

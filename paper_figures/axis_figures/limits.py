@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from design.design_file import Design
-from paper_figures.axis_figures.labels import KINDS, limits_said, look_of, united
+from paper_figures.axis_figures.labels import KINDS, look_of, united
 from paper_figures.look import panels
-from paper_figures.look.captions import duration
+from paper_figures.look.captions import duration, limits_said
 from paper_figures.look.style import FULL_WIDTH, LINES, figure, styled
 
 TABLES: tuple[str, ...] = ("limits_extended", "limits_extended_summary")

@@ -13,9 +13,9 @@ from matplotlib.ticker import NullFormatter
 from design.design_file import Design
 from experiments.rates import NAMES, lowest_rate
 from experiments.runs.compare_anti_windups import SETTLED
-from paper_figures.axis_figures.labels import KINDS, limits_said, look_of, united, with_unit
+from paper_figures.axis_figures.labels import KINDS, look_of, united
 from paper_figures.look import panels
-from paper_figures.look.captions import only, sampling_rate
+from paper_figures.look.captions import hertz, limits_said, only, with_unit
 from paper_figures.look.style import FULL_WIDTH, LINES, figure, styled
 
 TABLES: tuple[str, ...] = ("rates",)
@@ -46,14 +46,14 @@ def _said(table: pd.DataFrame, method: str, words: str) -> str:
     rate = lowest_rate(table, "corrected", method)
     if math.isnan(rate):
         return f"{words} do not come within 1 % of the error in continuous time at any of these rates."
-    return f"{words}, from {sampling_rate(rate)} on within 1 % of the error in continuous time."
+    return f"{words}, from {hertz(rate)} on within 1 % of the error in continuous time."
 
 
 def _divergent(table: pd.DataFrame) -> str:
     """Which of the runs on a computer are not there because they diverge."""
     gone = table[table["steady_error"].isna() & table["rate_hz"].notna()]
     rows = ((str(row.run), str(row.method), float(str(row.rate_hz))) for row in gone.itertuples())
-    said = [f"{KINDS.get(run, run)}, {METHODS[method][0]}, {sampling_rate(rate)}" for run, method, rate in rows]
+    said = [f"{KINDS.get(run, run)}, {METHODS[method][0]}, {hertz(rate)}" for run, method, rate in rows]
     return f" Not drawn, since it diverges: {'; '.join(said)}." if said else ""
 
 

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from design.design_file import Design
 from experiments.drive.sampled_loop import SampledRun
-from paper_figures.axis_figures.labels import KINDS, limits_said, with_unit
-from paper_figures.look.captions import duration, last_saturated, of_run, only
+from paper_figures.axis_figures.labels import KINDS
+from paper_figures.look.captions import duration, last_saturated, limits_said, of_run, only, with_unit
 from paper_figures.look.plot_run import plot_run
 
 TABLES: tuple[str, ...] = ("tracking", "tracking_summary")

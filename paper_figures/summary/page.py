@@ -82,9 +82,10 @@ def draw(summary: Summary, model: IdentifiedModel, tests: Sequence[FrequencyResp
         The plant with its bound, and the responses that it was fitted to.
     """
     for size in SIZES:
-        above = [_heading(summary, size), _table(summary.parameters, size), _paragraphs(summary.basis, size)]
-        below = [_table(summary.loops, size)] if summary.loops else []
-        below.append(_paragraphs(summary.designs, size))
+        above = [_heading(summary, size), _paragraphs(summary.advice, size), _table(summary.parameters, size)]
+        above.append(_paragraphs(summary.basis, size))
+        below = [_table(summary.runs, size)] if summary.runs else []
+        below.append(_paragraphs((*summary.designs, *summary.refused), size))
         room = HEIGHT - 2 * MARGIN - sum(block.height for block in (*above, *below))
         if room >= LEAST:
             break
