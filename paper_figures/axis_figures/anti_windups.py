@@ -87,12 +87,16 @@ def comparison(tables: Mapping[str, pd.DataFrame], words: Mapping[str, str]) -> 
 
 def _distances(panel: Axes, runs: pd.DataFrame, begin: float, amplitude: float, words: Mapping[str, str]) -> None:
     time_s = runs["time_s"].to_numpy(float) - begin
+    is_seen = False
     for run, said in words.items():
         if f"output_{run}" in runs:
             distance = (runs[f"output_{run}"] - runs["output_unsaturated"]).abs().to_numpy(float) / amplitude
             line = LINES[look_of(run)]
             points = panels.envelope(time_s, np.maximum(distance, FLOOR / 10))
             panel.plot(*points, **line, label=said, zorder=3 - line["linewidth"] / 10)
+            is_seen |= bool((distance > FLOOR).any())
+    if not is_seen:
+        _say(panel, "no run is away by as much as 0.1 %")
     panel.axhline(SETTLED, **LINES["saturation limits"])
     panel.set(yscale="log", ylim=(FLOOR, 10.0), xlim=(0.0, time_s[-1]))
     panel.set(xlabel="Time after the upset [s]", ylabel=r"$|y - y_\mathrm{unsaturated}|$ / amplitude")
@@ -103,6 +107,13 @@ def _measures(panel: Axes, table: pd.DataFrame, words: Mapping[str, str]) -> Non
         for _, row in table[(table["run"] == run) & table["recovery_s"].notna()].iterrows():
             look = DOT | {"fillstyle": FILLED.get(row["guarantee"], "bottom"), "color": LINES[look_of(run)]["color"]}
             panel.plot(row["largest_control"], row["recovery_s"], **look)
+    if not table["recovery_s"].max() > 0:
+        _say(panel, "every run recovers at once" if (table["recovery_s"] == 0).any() else "no run recovers")
     panel.set(xscale="log")
     panel.xaxis.set_minor_formatter(NullFormatter())
     panel.set(xlabel=r"Greatest $|u|$ / limit", ylabel="Recovery time [s]", ylim=(0, None))
+
+
+def _say(panel: Axes, words: str) -> None:
+    """What there is instead of lines."""
+    panel.text(0.5, 0.5, words, transform=panel.transAxes, ha="center", va="center")

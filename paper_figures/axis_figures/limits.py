@@ -19,7 +19,7 @@ from paper_figures.look.style import FULL_WIDTH, LINES, figure, styled
 
 TABLES: tuple[str, ...] = ("limits_extended", "limits_extended_summary")
 
-RUNS = ("none", "corrected")
+RUNS = ("corrected", "none")  # the thin lines upon the broad ones
 FLOOR = LINES["family 4"]
 GREY = panels.paler(FLOOR["color"], 0.6)
 DECADES = 3
@@ -29,7 +29,7 @@ DIVERGENT = 100.0  # a run that exceeds all that is out of reach by more than th
 def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the caption with the numbers of the tables."""
     row = tables["limits_extended"].iloc[0]
-    best, none, corrected = (_after(float(row[f"settling_{name}_s"])) for name in ("upper", *RUNS))
+    best, corrected, none = (_after(float(row[f"settling_{name}_s"])) for name in ("upper", *RUNS))
     return (
         f"How much is left to gain from rest under the limits "
         f"{limits_said(tables['limits_extended_summary'], design.signals.input_unit)}: the greatest error from a time "

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from design.design_file import Design
-from experiments.rates import NAMES, lowest_rate
+from experiments.rates import lowest_rate
 from experiments.runs.compare_anti_windups import SETTLED
 from paper_figures.axis_figures.labels import KINDS, look_of, united
 from paper_figures.look import panels
@@ -20,6 +20,7 @@ from paper_figures.look.style import FULL_WIDTH, LINES, figure, styled
 
 TABLES: tuple[str, ...] = ("rates",)
 
+RUNS = ("corrected", "none")  # the thin lines upon the broad ones
 CONTINUOUS = "continuous"
 METHODS = {"tustin": ("Tustin's rule", "o"), "exact": ("held inputs", "s")}
 MARKER = 3.5
@@ -31,22 +32,22 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the caption with the numbers of the tables."""
     table, signals = tables["rates"], design.signals
     band = with_unit(SETTLED * only(table, "amplitude"), signals.output_unit)
-    said = " ".join(_said(table, method, words) for method, (words, _) in METHODS.items())
+    said = ", ".join(_said(table, method, words) for method, (words, _) in METHODS.items())
     levels = only(table, "quantum")
     steps = f" in steps of {with_unit(levels, signals.input_unit)}" if levels else ""
     return (
         f"The controller on a computer, under the limits {limits_said(table, signals.input_unit)}{steps}: the greatest "
         "error of the last period over the sampling rate, its blocks discretised by Tustin's rule (circles) or as they "
         f"answer an input that is held for a sample (squares); broad, in continuous time; dotted, {band}, which is 1 % "
-        f"of the reference's amplitude. With the corrected anti-windup: {said}{_divergent(table)}"
+        "of the reference's amplitude. With the corrected anti-windup the error comes to stay within as much of that "
+        f"in continuous time by {said}.{_divergent(table)}"
     )
 
 
 def _said(table: pd.DataFrame, method: str, words: str) -> str:
     rate = lowest_rate(table, "corrected", method)
-    if math.isnan(rate):
-        return f"{words} do not come within 1 % of the error in continuous time at any of these rates."
-    return f"{words}, from {hertz(rate)} on within 1 % of the error in continuous time."
+    where = "at none of these rates" if math.isnan(rate) else f"from {hertz(rate)} on"
+    return f"{words} {where}"
 
 
 def _divergent(table: pd.DataFrame) -> str:
@@ -62,15 +63,15 @@ def draw(design: Design, tables: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the figure."""
     table = tables["rates"]
     panel = figure(FULL_WIDTH, 3.2).subplots()
-    over_rate(panel, table, NAMES)
-    for run in NAMES:
+    over_rate(panel, table, RUNS)
+    for run in RUNS:
         panel.plot([], [], **LINES[look_of(run)], label=KINDS[run])
     panel.axhline(SETTLED * only(table, "amplitude"), **LINES["saturation limits"])
     asked = only(table, "asked_hz")
     if not math.isnan(asked):
         panel.axvline(asked, **LINES["reference"], label="the computer's rate")
     panel.set_ylabel(united("Greatest error, last period", design.signals.output_unit))
-    known = table["steady_error"].dropna()
+    known = table["steady_error"][table["rate_hz"].notna()].dropna()
     known = known[(known > 0) & (known < DIVERGENT * only(table, "amplitude"))]
     if len(known):
         top = 2 * max(float(known.max()), SETTLED * only(table, "amplitude"))

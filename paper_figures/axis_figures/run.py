@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import pandas as pd
@@ -15,13 +16,14 @@ from paper_figures.look.plot_run import plot_run
 
 TABLES: tuple[str, ...] = ("tracking", "tracking_summary")
 
+SHOWN, ROOM = 6, 1.5  # periods that are shown; or as many times the time until which the control is saturated
 SIGNALS = ("output", "error", "control", "saturated")
 
 
 def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the caption with the numbers of the tables."""
     summary, signals = tables["tracking_summary"], design.signals
-    said = "; ".join(_said(summary, str(run), signals.output_unit) for run in summary["run"])
+    said = ". ".join(_said(summary, str(run), signals.output_unit) for run in summary["run"])
     return (
         f"The reference from rest under the limits {limits_said(summary, signals.input_unit)}: output, error, and the "
         f"control that is asked for with what the actuator gives out; shaded, where it is at a limit. {said}."
@@ -29,7 +31,7 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _said(summary: pd.DataFrame, run: str, unit: str) -> str:
-    words = KINDS.get(run, run)
+    words = KINDS.get(run, run).capitalize()
     offset, ripple = (of_run(summary, run, column) for column in ("offset", "ripple"))
     if pd.isna(offset):
         return f"{words}: the run diverges"
@@ -40,7 +42,10 @@ def _said(summary: pd.DataFrame, run: str, unit: str) -> str:
 
 def draw(design: Design, tables: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the figure."""
-    table, summary = tables["tracking"], tables["tracking_summary"]
+    summary, table = tables["tracking_summary"], tables["tracking"]
+    saturated = float(summary["last_saturation_s"].max(skipna=False))
+    least = SHOWN * only(summary, "span_s")
+    table = table[table["time_s"] <= max(least, 2 * least if math.isnan(saturated) else ROOM * saturated)]
     time_s, reference = (table[name].to_numpy(float) for name in ("time_s", "reference"))
     runs = {
         str(run): SampledRun(time_s, reference, *(table[f"{name}_{run}"].to_numpy(float) for name in SIGNALS))

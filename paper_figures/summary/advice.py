@@ -42,7 +42,7 @@ def advice(model: IdentifiedModel, found: Found) -> tuple[Paragraph, ...]:
     do, do_not = list(_do(found, model.signals)), list(_do_not(found, model.signals))
     parts = (
         ("Do", do),
-        ("Do not", do_not),
+        ("Avoid", do_not),
         ("Mind", cautions(model)),
         ("Assumed", list(_assumed(found.axis, model.signals))),
         ("To come", list(_to_come(found))),
@@ -140,14 +140,14 @@ def _limits(tracking: pd.DataFrame, best: pd.DataFrame | None, signals: Signals)
     takes = f"following the reference takes {number(least)} to {with_unit(greatest, unit)}"
     share = max(greatest / high, least / low) if low < 0 < high else math.nan
     if low < least and greatest < high:
-        used = "" if math.isnan(share) else f", {number(100 * share, 2)} % of them"
+        used = "" if math.isnan(share) else f", {number(100 * share, 2)} % of the way to the nearer one"
         unsaturated = only(tracking, "linear_control")
         reached = (
             "the control never reaches them"
             if of_run(tracking, "none", "last_saturation_s") == 0
             else f"on the way there the loop asks for up to {with_unit(unsaturated, unit)}, and they act"
         )
-        return f"Keep reference and limits: the limits {within} suffice, {takes}{used}; {reached}."
+        return f"The limits {within} suffice for this reference: {takes}{used}; {reached}."
     forced = 0.0 if best is None else float(best["periodic_lower"].iloc[0])
     leaves = f" and leaves an error of {with_unit(forced, signals.output_unit)} or more" if forced > 0 else ""
     remedy = f" to {number(100 / share, 2)} % of its size, or widen the limits {number(share)} times"

@@ -120,14 +120,15 @@ def fitted(model: IdentifiedModel) -> FitRecord:
 
 
 def _gain_unit(signals: Signals, integrators: int) -> str:
-    """The unit of K in K/s^integrators: that of a response with as many seconds below, or above."""
-    unit, seconds = signals.gain_unit, "s" if abs(integrators) == 1 else f"s^{abs(integrators)}"
-    if not unit or integrators == 0:
-        return unit
-    above, _, below = unit.partition("/")
-    if integrators < 0:
-        return f"{above} {seconds}{f'/{below}' if below else ''}"
-    return f"{above}/({below.strip('()')} {seconds})" if below else f"{above}/{seconds}"
+    """The unit of K in K/s^integrators: output over input, with as many seconds below, or above."""
+    if not signals.gain_unit:
+        return ""
+    above, below = signals.output_unit, signals.input_unit
+    seconds = "" if integrators == 0 else "s" if abs(integrators) == 1 else f"s^{abs(integrators)}"
+    above, below = (above, f"{below} {seconds}") if integrators > 0 else (f"{above} {seconds}", below)
+    above, below = above.strip() or "1", below.strip()
+    above, below = (f"({each})" if set(each) & set(" /*") else each for each in (above, below))
+    return f"{above}/{below}" if below else above
 
 
 def _rounded(value: float, digits: int) -> str:
@@ -241,7 +242,7 @@ def _bound(bound: AdditiveBound, report: BoundReport) -> str:
         for touch in report.touches[:MOST_TOUCHES]
     ]
     return (
-        f"{bound_text(bound)}: at no line below the distance of a test from the model, nor between the "
+        f"W_a bounds how far the plant may be from the model: {bound_text(bound)}, at no line below the distance of a test from the model, nor between the "
         "lines, as far as was looked, below that of its own fit, "
         f"{number(report.mean_excess)} times their envelope on average and "
         f"{number(report.largest_excess)} times at most (no bound of this order gets below "

@@ -107,7 +107,7 @@ def _runs(tracking: pd.DataFrame, signals: Signals) -> Table:
         "run",
         "last at a limit [s]",
         f"most asked for{asked}",
-        f"last period's error{left}",
+        f"error, last period{left}",
         "of the amplitude [%]",
     )
     return Table(head, tuple(_run(row) for row in tracking.to_dict("records")))
