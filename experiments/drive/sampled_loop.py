@@ -14,7 +14,9 @@ from design.blocks.state_space import StateSpace, block_diagonal, realize
 from design.chapters_3_4.realisation import realised
 from design.design_file import Asked, Design
 from experiments.drive.compiled_steps import Actuator, Series, run
-from experiments.drive.difference_equations import METHODS, SampledBlock, held, sample_block, sample_memory, split
+from experiments.drive.difference_equations import METHODS as RULES
+from experiments.drive.difference_equations import SampledBlock, held, sample_block, sample_memory, split
+from experiments.drive.matched_controller import matched_controller
 from experiments.engine.simulate import MOST_STEPS, DivergenceError, limit_pair
 from experiments.engine.watched import Tick, watched
 from experiments.runs.disturbances import UNDISTURBED, Disturbances, Signal
@@ -22,6 +24,8 @@ from experiments.runs.references import Reference, SampledReference
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
+METHODS = ("matched", *RULES)
+"""How the controller is discretised."""
 FORMS = ("coprime", "thesis")
 """How the controller is realised."""
 MOST_LEVELS = 2.0**53  # which are still whole numbers
@@ -241,6 +245,8 @@ def controller_blocks(
     compensator = (Block(0.0), Block(0.0))
     if anti_windup is not None:
         compensator = (anti_windup.theta1_tilde, anti_windup.theta2(design.loop_plant))
+    if drive.method == "matched":
+        return *matched_controller(design, anti_windup, T, form), 0.0
     if form == "thesis":
         feedback = sample_block(realize(second), [delay_s], T, drive.method)
     else:
