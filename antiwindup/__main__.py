@@ -40,7 +40,6 @@ class Rooms(CommandGroup):
 
 
 @click.group(cls=Rooms)
-@click.version_option(package_name="antiwindup-thesis")
 def main() -> None:
     """From sine sweeps of a plant with dead time to its anti-windup: models, designs, saturated loops, figures."""
 

@@ -28,9 +28,7 @@ MODEL = click.option("--model", help="A model.json, or table or implied: what to
 build_options = together(
     click.option("--output", required=True, help="Folder to write to."),
     click.option("--limit", type=float, help="Saturation limits +-LIMIT, instead of the thesis's."),
-    click.option(
-        "--plants", type=click.IntRange(1), default=200, show_default=True, help="Drawn within W_a (Fig. A.6)."
-    ),
+    click.option("--plants", type=click.IntRange(1), default=200, help="Drawn within W_a (Fig. A.6)."),
     click.option("--jobs", type=click.IntRange(1), help="How many steps run at once; one a processor unless given."),
     click.option("--force", is_flag=True, help="Replace what stands in the place of an output, whoever wrote it."),
     reading_options,

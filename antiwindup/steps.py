@@ -135,7 +135,7 @@ def _designs(asked: Asked) -> list[Step]:
     """With the thesis's references and free parameters; robust has a roll-off, so that W_a guarantees its stability."""
     extended = ("extended", "--reference-omega", "1.5", "--a", "4", "--e", "2", "--f", "1")
     commands = {
-        "delay_free": ("delay-free", "--period", "4", "--epsilon", "1e-4"),
+        "delay_free": ("delay-free", "--reference-hz", "0.25", "--epsilon", "1e-4"),
         "extended": extended,
         "robust": (*extended, "--robust-level", "0.9"),
     }
@@ -174,8 +174,8 @@ def _experiments(asked: Asked) -> list[Step]:
             (*asked.model_files, *files),
         ),
         _tables(folder, "f-gamma", extended),
-        _tables(folder, "delay-free", delay_free, options=limit),
-        _tables(folder, "extended", extended, options=limit),
+        _tables(folder, "chapter-2", delay_free, options=limit, stem="delay_free"),
+        _tables(folder, "chapter-4", extended, options=limit, stem="extended"),
         _tables(folder, "trade-off", extended),
         _tables(folder, "interpolation", extended, more=("interpolation_map",)),
         _tables(folder, "robustness", extended, robust),

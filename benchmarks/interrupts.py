@@ -36,7 +36,8 @@ COMMANDS = {
     "fit": ["identification", "fit", *SWEEPS, "--output", "{folder}/m.json", "--responses", "{folder}/r.npz"],
     "extended": ["design", "extended", "implied", *EXTENDED, "--output", "{folder}/d.json"],
     "delay-free": [
-        *["design", "delay-free", "implied", "--period", "4", "--epsilon", "1e-4", "--output", "{folder}/d.json"],
+        *["design", "delay-free", "implied", "--reference-hz", "0.25"],
+        *["--epsilon", "1e-4", "--output", "{folder}/d.json"],
     ],
     "audit": ["design", "audit", "{extended}"],
     "simulate": [

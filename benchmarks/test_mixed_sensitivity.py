@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from math import tau
 
 import control
 import pytest
@@ -39,7 +40,7 @@ def test_against_slycot(against: Callable[..., object], problem: tuple[Block, Bl
 def test_chapter_two_synthesis(benchmark) -> None:  # type: ignore[no-untyped-def]
     """The synthesis alone; slycot does not come back on it."""
     model = model_named("implied")
-    design = design_delay_free(model, 4.0, 1e-4)
+    design = design_delay_free(model, [tau / 4.0], 1e-4)
     assert design.hinf is not None
     W1, W2, decay_rate = design.hinf.W1, design.hinf.W2, design.hinf.decay_rate
     benchmark(mixed_sensitivity, design.blocks["G_A"], W1, W2, decay_rate)
@@ -48,7 +49,7 @@ def test_chapter_two_synthesis(benchmark) -> None:  # type: ignore[no-untyped-de
 def test_chapter_two_infimum(benchmark) -> None:  # type: ignore[no-untyped-def]
     """The decay rate driven down until the infimum of (2.8) is known to 1 %."""
     model = model_named("implied")
-    design = design_delay_free(model, 4.0, 1e-4)
+    design = design_delay_free(model, [tau / 4.0], 1e-4)
     assert design.hinf is not None
     W1, W2, decay_rate = design.hinf.W1, design.hinf.W2, design.hinf.decay_rate
     benchmark(infimum, design.blocks["G_A"], W1, W2, decay_rate)

@@ -30,6 +30,17 @@ if TYPE_CHECKING:
 
 OUTPUT = click.option("--output", type=OUTPUT_FILE, required=True, help="design.json to write.")
 DESIGN = click.argument("design", type=INPUT_FILE)
+frequency_options = together(
+    click.option(
+        "--reference-hz",
+        "hertz",
+        type=float,
+        multiple=True,
+        help="Frequency of the reference in Hz; once for each sinusoid; 0 is a constant.",
+    ),
+    click.option("--reference-omega", "omegas", type=float, multiple=True, help="The same in rad/s."),
+)
+"""Frequencies of the reference, the same for both designs."""
 corrected_options = together(
     click.option(
         "--recovery",
@@ -65,14 +76,7 @@ def main() -> None:
 
 @main.command("delay-free")
 @click.argument("model")
-@click.option(
-    "--period",
-    "periods",
-    type=float,
-    multiple=True,
-    required=True,
-    help="Period of the sinusoidal reference in seconds; once for each sinusoid.",
-)
+@frequency_options
 @click.option(
     "--epsilon", type=float, help="Of the factor s^2 + epsilon of Lambda, rad^2/s^2; constants are held nearly."
 )
@@ -86,7 +90,8 @@ def main() -> None:
 @OUTPUT
 def delay_free(
     model: str,
-    periods: tuple[float, ...],
+    hertz: tuple[float, ...],
+    omegas: tuple[float, ...],
     epsilon: float | None,
     integral_action: bool,
     recovery: float | None,
@@ -102,9 +107,10 @@ def delay_free(
     if (epsilon is None) != integral_action:
         found = "both are given" if integral_action else "none is given"
         raise InputError(f"of --epsilon and --integral-action {found}; expected one of them")
+    frequencies = _frequencies(hertz, omegas)
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
-    design = design_delay_free(given, periods, epsilon, recovery, sector, bandwidth, guarantee)
+    design = design_delay_free(given, frequencies, epsilon, recovery, sector, bandwidth, guarantee)
     hinf = design.hinf
     assert hinf is not None
     hidden = 0 if integral_action else given.plant.integrators
@@ -126,21 +132,12 @@ def delay_free(
 
 @main.command("extended")
 @click.argument("model")
-@click.option(
-    "--reference-omega",
-    "omegas",
-    type=float,
-    multiple=True,
-    help="Angular frequency of the reference, rad/s; once for each; 0 is a constant.",
-)
-@click.option("--reference-hz", "hertz", type=float, multiple=True, help="The same in Hz.")
+@frequency_options
 @click.option("--a", type=float, help="Closed-loop pole of the free part, rad/s; as fast as W_a allows unless given.")
 @click.option("--e", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
 @click.option("--f", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
-@click.option("--method", type=click.Choice(METHODS), default="zeros", show_default=True, help="How Q is designed.")
-@click.option(
-    "--inverse-epsilon", type=float, default=0.0, show_default=True, help="Of R_eps^-1 = R_0^-1/(1 + eps s)^2 (3.2), s."
-)
+@click.option("--method", type=click.Choice(METHODS), default="zeros", help="How Q is designed.")
+@click.option("--inverse-epsilon", type=float, default=0.0, help="Of R_eps^-1 = R_0^-1/(1 + eps s)^2 (3.2), s.")
 @click.option(
     "--robust-level",
     type=float,
@@ -152,8 +149,8 @@ def delay_free(
 @OUTPUT
 def extended(
     model: str,
-    omegas: tuple[float, ...],
     hertz: tuple[float, ...],
+    omegas: tuple[float, ...],
     a: float | None,
     e: tuple[float, ...],
     f: tuple[float, ...],
@@ -175,15 +172,12 @@ def extended(
 
     if len(e) != len(f):
         raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected as many")
-    if not omegas and not hertz:
-        raise InputError(
-            "no frequency of the reference is given; expected --reference-hz or --reference-omega, 0 for a constant"
-        )
+    frequencies = _frequencies(hertz, omegas)
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
     design = design_extended(
         given,
-        (*omegas, *(tau * frequency for frequency in hertz)),
+        frequencies,
         a,
         list(zip(e, f, strict=True)) or None,
         method,
@@ -233,7 +227,6 @@ def anti_windup_command(design: Path, name: str, numerator: str, denominator: st
     "--windup",
     type=float,
     default=1.0,
-    show_default=True,
     help="Integral of u - sat(u), in input unit times second, for the lasting offset.",
 )
 def audit_command(design: Path, windup: float) -> None:
@@ -247,6 +240,15 @@ def audit_command(design: Path, windup: float) -> None:
     content = read_design(design)
     click.echo(audit_text(content, audit(content), windup))
     click.echo(f"\n{_compared(content)}")
+
+
+def _frequencies(hertz: tuple[float, ...], omegas: tuple[float, ...]) -> tuple[float, ...]:
+    """All frequencies of the reference in rad/s; raises InputError when there is none."""
+    if not hertz and not omegas:
+        raise InputError(
+            "no frequency of the reference is given; expected --reference-hz or --reference-omega, 0 for a constant"
+        )
+    return *(tau * frequency for frequency in hertz), *omegas
 
 
 def _coefficients(text: str, option: str) -> list[float]:

@@ -16,7 +16,7 @@ from typing import Any
 import click
 
 from experiments.campaign.command import campaign_command
-from experiments.options import DESIGN, OUTPUT_FOLDER, positive_limit, sinusoid_options
+from experiments.options import DESIGN, OUTPUT_FOLDER, asked_limits, sinusoid_options
 from experiments.pair_options import NumberPair, PairCommand
 from experiments.run_commands import sampled_command, simulate_command
 from experiments.tables import write_into
@@ -84,12 +84,18 @@ def limits(design: Path, limits: tuple[tuple[float, ...], ...], output: Path, **
         write_into(output, limits_tables(content, sinusoids(content, **reference), limits, bar.update))
 
 
-@main.command("compare")
+@main.command("compare", cls=PairCommand)
 @DESIGN
-@click.option("--limit", type=float, help="Saturation limits +-LIMIT; 1.2 times what the reference needs by default.")
+@click.option(
+    "--limit",
+    type=NumberPair(),
+    metavar="[LOW] HIGH",
+    help="Saturation limits in the actuator's unit, LOW < HIGH, or one number for +- that; unless given, +-1.2 times "
+    "what the reference needs.",
+)
 @sinusoid_options
 @OUTPUT_FOLDER
-def compare(design: Path, limit: float | None, output: Path, **reference: Any) -> None:
+def compare(design: Path, limit: tuple[float, ...] | None, output: Path, **reference: Any) -> None:
     """The anti-windups of DESIGN beside those of others: compare.csv, compare_runs.csv."""
     from tqdm import tqdm
 
@@ -100,7 +106,9 @@ def compare(design: Path, limit: float | None, output: Path, **reference: Any) -
     content = read_design(design)
     with tqdm(desc="compare", unit="", disable=None, leave=False) as bar:
         asked = sinusoids(content, **reference)
-        write_into(output, comparison_tables(content, asked, positive_limit(limit), bar.update))
+        write_into(
+            output, comparison_tables(content, asked, None if limit is None else asked_limits(limit), bar.update)
+        )
 
 
 if __name__ == "__main__":

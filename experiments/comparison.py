@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -11,7 +11,7 @@ from design.anti_windup.compensator import AntiWindup, uncertainty_cost
 from design.anti_windup.other_anti_windups import OTHERS
 from design.blocks.block import plant_block
 from design.design_file import Design
-from experiments.engine.simulate import Run, simulate
+from experiments.engine.simulate import Run, limit_pair, simulate
 from experiments.physical_limits.least_peak_error import RestLimit
 from experiments.runs.compare_anti_windups import SETTLED, run_all, span
 from experiments.runs.design_loop import design_loop
@@ -35,7 +35,7 @@ Tick = Callable[[], object]
 def comparison_tables(
     design: Design,
     reference: Reference,
-    limit: float | None = None,
+    limits: float | Sequence[float] | None = None,
     tick: Tick = lambda: None,
     plant: PlantModel | None = None,
 ) -> dict[str, pd.DataFrame]:
@@ -47,8 +47,9 @@ def comparison_tables(
         Of either kind.
     reference
         r(t).
-    limit
-        Of the actuator, +-limit; unless given, 1.2 times the most that the control of perfect tracking reaches.
+    limits
+        Of the actuator, (lower, upper) in its unit, or one number for +- that; unless given, +-1.2 times the most that
+        the control of perfect tracking reaches.
     tick
         Called after every run.
     plant
@@ -58,7 +59,7 @@ def comparison_tables(
     -------
     dict
         ``compare``: for every anti-windup two rows. The upset ``start`` begins at rest, ``pulse`` four periods later:
-        a disturbance as large as the limit is added to the plant's input for a tenth of a period. Each counts for four
+        a disturbance of half their distance is added to the plant's input for a tenth of a period. Each counts for four
         periods, and times count from its beginning.
 
         run, upset, refused
@@ -75,28 +76,28 @@ def comparison_tables(
             The greatest |r - y| from from_s on, a quarter of a period after the beginning, and what no controller
             betters; the last for the start only, and for a periodic reference.
         largest_control, last_error
-            The greatest |u| over the limit, and the greatest |r - y| of the last period.
-        limit, required
-            The latter is the most that the control of perfect tracking reaches.
+            The greatest |u| over the larger limit, and the greatest |r - y| of the last period.
+        lower_limit, limit, required
+            The last is the most that the control of perfect tracking reaches.
 
         ``compare_runs``: time_s, reference, output_unsaturated, and for every run NAME output_NAME and control_NAME.
 
     Raises
     ------
     InputError
-        The limit is not positive, or perfect tracking needs no control or one without bound.
+        A limit is infinite, they are not in order, or perfect tracking needs no control or one without bound.
     """
     true = design.loop_plant if plant is None else plant
     required = reference.required(true).value
-    if limit is None and not 0 < required < np.inf:
+    if limits is None and not 0 < required < np.inf:
         raise InputError(f"the control that the reference needs reaches {required:g}, from which no limit follows")
-    limit = MULTIPLE * required if limit is None else limit
-    if not 0 < limit < np.inf:
-        raise InputError(f"the limit is {limit:g}; expected a positive finite number")
+    low, high = limit_pair(MULTIPLE * required if limits is None else limits)
+    if not (np.isfinite(low) and np.isfinite(high)):
+        raise InputError(f"the limits are {low:g} and {high:g}; expected finite numbers")
     period = _period(design, reference)
     time_s = np.linspace(0.0, 2 * PERIODS * period, 2 * PERIODS * SAMPLES + 1)
     begin = PERIODS * period
-    disturbances = Disturbances(input=steps([(limit, begin), (0.0, begin + PULSE * period)]))
+    disturbances = Disturbances(input=steps([((high - low) / 2, begin), (0.0, begin + PULSE * period)]))
 
     kinds, refused = anti_windups(design)
     loops = {name: design_loop(design, reference, kind, true, disturbances) for name, kind in kinds.items()}
@@ -104,20 +105,26 @@ def comparison_tables(
     runs: dict[str, Run] = {}
     for name, loop in loops.items():
         try:
-            runs |= run_all({name: loop}, limit, time_s)
+            runs |= run_all({name: loop}, (low, high), time_s)
         except InputError as error:
             refused[name] = str(error)
         tick()
-    from_s, least = _least_error(true, reference, limit, period)
+    from_s, least = _least_error(true, reference, (low, high), period)
     rows = []
     for name in ("none", *design.anti_windup, *OTHERS):
-        known: dict[str, object] = {"limit": limit, "required": required, "refused": refused.get(name)}
+        known: dict[str, object] = {
+            "lower_limit": low,
+            "limit": high,
+            "required": required,
+            "refused": refused.get(name),
+        }
         if name in kinds:
             known |= _promised(design, kinds[name], true)
         for upset, start_s in (("start", 0.0), ("pulse", begin)):
             row: dict[str, object] = {"run": name, "upset": upset} | known
             if name in runs:
-                row |= _row(runs[name], unsaturated, start_s, period, from_s, limit, SETTLED * reference.amplitude)
+                larger, band = max(-low, high), SETTLED * reference.amplitude
+                row |= _row(runs[name], unsaturated, start_s, period, from_s, larger, band)
                 row |= {"least_peak_error": least if upset == "start" else np.nan}
             rows.append(row)
     series = {"time_s": time_s, "reference": reference(time_s), "output_unsaturated": unsaturated}
@@ -154,10 +161,12 @@ def _promised(design: Design, kind: AntiWindup | None, plant: PlantModel) -> dic
     return {"guarantee": said, "f": uncertainty_cost(design.additive_bound, kind.one_plus)[0]}
 
 
-def _least_error(plant: PlantModel, reference: Reference, limit: float, period: float) -> tuple[float, float]:
+def _least_error(
+    plant: PlantModel, reference: Reference, limits: tuple[float, float], period: float
+) -> tuple[float, float]:
     """From when on errors count, in seconds, and how small the greatest can be at best; NaN where it is not known."""
     try:
-        rest = RestLimit(plant, reference, limit, STEPS)
+        rest = RestLimit(plant, reference, limits, STEPS)
         index = round(rest.last / (4 * 2))
         return rest.start_s(index), rest.at(index).lower
     except InputError:

@@ -15,7 +15,12 @@ OUTPUT_FOLDER = click.option(
 )
 sinusoid_options = together(
     click.option("--amplitude", type=float, multiple=True, help="Of the reference; once a frequency of DESIGN."),
-    click.option("--phase", type=float, multiple=True, help="In radians; once a frequency; 0 unless given."),
+    click.option(
+        "--phase",
+        type=float,
+        multiple=True,
+        help="In radians; once a frequency; 0 unless given, and pi/2 for a constant.",
+    ),
     click.option("--offset", type=float, help="Of the reference, 0 unless given."),
 )
 """The sinusoids of a reference: ``--amplitude``, ``--phase`` and ``--offset``."""

@@ -33,6 +33,12 @@ _run_options = together(
     reference_options,
     disturbance_options,
     click.option(
+        "--rate-limit",
+        type=float,
+        default=math.inf,
+        help="Most change of the actuator in a second, in its unit, unknown to the controller.",
+    ),
+    click.option(
         "--plant", help="The true plant: a model.json, table or implied; the design's own model unless given."
     ),
     click.option("--output", type=OUTPUT_FILE, required=True, help="CSV to write."),
@@ -42,12 +48,6 @@ _run_options = together(
 @click.command("simulate", cls=PairCommand)
 @_run_options
 @click.option("--sample-time", type=float, required=True, help="Distance of the output's rows in seconds.")
-@click.option(
-    "--rate-limit",
-    type=float,
-    default=math.inf,
-    help="Most change of the actuator in a second, in its unit, unknown to the controller; inf by default.",
-)
 @click.option("--alpha", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
 @click.option("--beta", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
 @click.option("--gamma", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
@@ -149,20 +149,18 @@ def simulate_command(
 @_run_options
 @click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
 @click.option("--method", required=True, help="How its blocks are discretised, tustin or exact.")
-@click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels; 0, no levels, by default.")
-@click.option("--slew", type=float, default=math.inf, help="Most change of the actuator in a second; inf by default.")
-@click.option("--input-delay", type=float, default=0.0, help="From sample to actuator in seconds; 0 by default.")
+@click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels in its unit; 0, no levels.")
+@click.option("--input-delay", type=float, default=0.0, help="From sample to actuator in seconds.")
 @click.option(
     "--form",
     default="coprime",
-    show_default=True,
     help="How the controller is realised: coprime, without hidden modes, or thesis, as drawn in Fig. 2.6.",
 )
 @click.option(
     "--resolution",
     type=float,
     default=0.0,
-    help="Of the computer's own numbers, in the actuator's unit; 0, as fine as doubles, by default.",
+    help="Of the computer's own numbers, in the actuator's unit; 0, as fine as doubles.",
 )
 def sampled_command(
     design: Path,
@@ -172,7 +170,7 @@ def sampled_command(
     rate: float,
     method: str,
     quantum: float,
-    slew: float,
+    rate_limit: float,
     input_delay: float,
     form: str,
     resolution: float,
@@ -201,7 +199,7 @@ def sampled_command(
     from experiments.runs.region import require_within_region
     from experiments.runs.sector_promise import steady_control, verdict
 
-    drive = Drive(rate, method, asked_limits(limit), quantum, slew, input_delay, resolution)
+    drive = Drive(rate, method, asked_limits(limit), quantum, rate_limit, input_delay, resolution)
     _require_few_rows(until * rate)
     inputs = _inputs(design, plant, reference["reference"])
     require_writable(output, inputs=inputs)

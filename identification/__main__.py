@@ -95,20 +95,19 @@ fit_options = together(
         default="auto",
         type=Counts(8),
         metavar="auto|N|Z/P",
-        help="Zero and pole modes, up to 8.  [default: auto]",
+        help="Zero and pole modes, up to 8.",
     ),
     click.option(
         "--real",
         default="auto",
         type=Counts(3),
         metavar="auto|N|Z/P",
-        help="Real zeros and poles, up to 3.  [default: auto]",
+        help="Real zeros and poles, up to 3.",
     ),
     click.option(
         "--integrators",
         default="auto",
         type=click.Choice(["auto", "-2", "-1", "0", "1", "2"]),
-        show_default=True,
         help="Poles at s = 0; a negative number counts zeros there.",
     ),
     click.option(
@@ -122,14 +121,12 @@ fit_options = together(
         "--loss",
         default="least-squares",
         type=click.Choice(["least-squares", "soft-l1"]),
-        show_default=True,
         help="soft-l1: outliers can hardly move the fit.",
     ),
     click.option(
         "--bound-order",
         default=2,
         type=click.IntRange(1, HIGHEST_ORDER),
-        show_default=True,
         help="Poles of W_a; 2 is Eq. (2.22).",
     ),
     click.option(
@@ -144,15 +141,15 @@ fit_options = together(
         metavar="LEVEL",
         help="The same from the highest line to ten times it; above, W_a falls off like 1/s.",
     ),
-    click.option("--seed", default=0, type=click.IntRange(min=0), show_default=True, help="Of the random restarts."),
+    click.option("--seed", default=0, type=click.IntRange(min=0), help="Of the random restarts."),
 )
 """How a fit is made."""
 
 signal_options = together(
-    click.option("--input-name", default="input", show_default=True, help="What the plant's input is called."),
-    click.option("--input-unit", default="", help="Its unit, such as A."),
-    click.option("--output-name", default="output", show_default=True, help="What the plant's output is called."),
-    click.option("--output-unit", default="", help="Its unit, such as m."),
+    click.option("--input-name", default="input", help="What the plant's input is called."),
+    click.option("--input-unit", default="", show_default=False, help="Its unit, such as A."),
+    click.option("--output-name", default="output", help="What the plant's output is called."),
+    click.option("--output-unit", default="", show_default=False, help="Its unit, such as m."),
 )
 """Names and units of the plant's input and output, which model.json and what is made of it keep."""
 

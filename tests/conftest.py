@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
+from math import tau
 from pathlib import Path
 
 import pytest
@@ -69,4 +70,4 @@ def extended_design(implied: IdentifiedModel) -> Design:
 @pytest.fixture(scope="session")
 def delay_free_design(implied: IdentifiedModel) -> Design:
     """Chapter 2 with the printed period and epsilon."""
-    return design_delay_free(implied, period_s=4.0, epsilon=1e-4)
+    return design_delay_free(implied, [tau / 4.0], 1e-4)

@@ -89,7 +89,17 @@ def models(rng: random.Random, cheap: bool) -> Case:
         options = ("--reference-omega", "1.5", "--a", "4", "--e", "2", "--f", "1", "--output", "design.json")
         commands += [
             ("design", "extended", "model.json", *options),
-            ("design", "delay-free", "model.json", "--period", "4", "--epsilon", "1e-4", "--output", "design.json"),
+            (
+                "design",
+                "delay-free",
+                "model.json",
+                "--reference-hz",
+                "0.25",
+                "--epsilon",
+                "1e-4",
+                "--output",
+                "design.json",
+            ),
             ("paper_figures", "summary", "model.json", "sweep.csv", "--build", "out"),
             ("experiments", "thesis", "additive-error", "model.json", "sweep.csv", "--output", "out"),
             BODE,
@@ -214,14 +224,14 @@ LONG = (
 )
 """Commands that take long whatever their options."""
 
-COSTLY = ("audit", "extended", "delay-free", "f-gamma", "interpolation")
+COSTLY = ("audit", "extended", "delay-free", "chapter-2", "chapter-4", "f-gamma", "interpolation")
 """Those that take more than a tenth of a second."""
 
 RIGHT = {
     **{"design": "design_extended.json", "designs": "design_robust.json", "model": "model.json", "sweeps": "sweep.csv"},
     **{"campaign": "campaign.parquet", "names": "fig_2_02", "plant": "implied", "limit": "12"},
     **{"until": "0.2", "sample_time": "0.01", "rate": "1000", "anti_windup": "corrected", "amplitude": "50"},
-    **{"omegas": "1.5", "a": "4", "e": "2", "f": "1", "period": "4", "epsilon": "1e-4", "method": "tustin"},
+    **{"omegas": "1.5", "a": "4", "e": "2", "f": "1", "epsilon": "1e-4", "method": "tustin"},
     **{"name": "mine", "numerator": "-25", "denominator": "1 25", "modes": "1", "real": "0", "integrators": "1"},
     **{"bound_order": "1", "bound_below": "0.5", "bound_above": "0.1"},
     **{"seed": "1", "sector": "0.9", "reference": "reference.csv", "loss": "soft-l1"},
@@ -252,7 +262,7 @@ def _right(parameter: click.Parameter, command: str, rng: random.Random) -> str:
         return "out" if is_folder else "written"
     if isinstance(parameter.type, click.Choice):
         return rng.choice(list(parameter.type.choices))
-    if (parameter.name, command) == ("design", "delay-free"):
+    if (parameter.name, command) == ("design", "chapter-2"):
         return "design_delay_free.json"
     return RIGHT.get(str(parameter.name), "1")
 
@@ -328,7 +338,7 @@ LONGER = (
     BODE,
     ("identification", "fit", "sweep.csv", *SMALL, "--output", "written", "--responses", "kept.npz"),
     ("paper_figures", "summary", "model.json", "sweep.csv", "--build", "out"),
-    ("design", "delay-free", "model.json", "--period", "4", "--epsilon", "1e-4", "--output", "written"),
+    ("design", "delay-free", "model.json", "--reference-hz", "0.25", "--epsilon", "1e-4", "--output", "written"),
 )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 from functools import cache
+from math import tau
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -86,7 +87,7 @@ def designs() -> dict[str, bytes]:
     return {
         "design_extended.json": design_extended(implied, [1.5], 4.0, [(2.0, 1.0)]).to_json().encode(),
         "design_robust.json": design_extended(implied, [1.5], 4.0, [(2.0, 1.0)], robust_level=0.9).to_json().encode(),
-        "design_delay_free.json": design_delay_free(implied, 4.0, 1e-4).to_json().encode(),
+        "design_delay_free.json": design_delay_free(implied, [tau / 4.0], 1e-4).to_json().encode(),
     }
 
 

@@ -32,7 +32,7 @@ def check(case: Case) -> list[Finding]:
         method=str(random.choice(["tustin", "exact"])),
         limits=(-limit, limit),
         quantum=limit / 500 if random.random() < 0.3 else 0.0,
-        slew=limit * rate * float(10 ** random.uniform(-2, 0)) if random.random() < 0.3 else math.inf,
+        rate_limit=limit * rate * float(10 ** random.uniform(-2, 0)) if random.random() < 0.3 else math.inf,
         input_delay_s=float(random.choice([0.0, 1.0, random.uniform(0, 3)])) / rate,
     )
     found = simulate_sampled(design, case.reference, kind, drive, (SAMPLES - 0.5) / rate, plant, form="thesis")
@@ -176,7 +176,7 @@ class _Motor:
 
     def __init__(self, drive: Drive, plant: Factors, late: float) -> None:
         self.A, self.b, self.c, _ = realised(plant)
-        self.slew, self.late = drive.slew, late
+        self.slew, self.late = drive.rate_limit, late
         low, high = drive.limits
         self.rest = min(max(0.0, low), high)
         self.pieces: list[tuple[float, float, float]] = []  # from a time on: value there, slope

@@ -17,7 +17,6 @@ from design.hinf.pick import Problem
 from design.parameters import DelayFreeParameters
 from design.stability.delay_loop import DelayLoop
 from design.stability.margins import robustness_of
-from identification.base.errors import InputError
 from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
@@ -26,13 +25,13 @@ TRACKING = 0.01  # W1 asks for |S| below gamma times this at the reference's fre
 
 
 def stabiliser_problem(
-    plant: PlantModel, bound: AdditiveBound, period_s: float | Sequence[float], epsilon: float | None
+    plant: PlantModel, bound: AdditiveBound, reference_omegas: Sequence[float], epsilon: float | None
 ) -> tuple[InternalModel, Problem]:
     """The internal model units, and what the stabiliser K has to minimise.
 
     Parameters
     ----------
-    plant, bound, period_s, epsilon
+    plant, bound, reference_omegas, epsilon
         As for :func:`design_delay_free`.
 
     Raises
@@ -51,11 +50,11 @@ def stabiliser_problem(
     zeros there cancel, and W1(0) = 1/TRACKING. The decay rate leaves SETTLED of a transient after the longest period,
     or is half that of the slowest mode of plant and bound where these decay more slowly.
     """
-    plant, omegas = plant.without_delay(), reference_omegas(period_s)
+    plant, omegas = plant.without_delay(), tuple(map(float, reference_omegas))
     A, B, W_a = plant_denominator(plant), plant_numerator(plant), bound_block(bound)
     units = internal_model(plant, omegas, epsilon, roll_off=0 if W_a.relative_degree else 1)
     slowest = min(-root.real for root in A.zeros + B.zeros + W_a.poles if root != 0)
-    decay_rate = min(math.log(1 / SETTLED) / float(np.max(period_s)), slowest / 2)
+    decay_rate = min(math.log(1 / SETTLED) * min(omegas) / math.tau, slowest / 2)
 
     fastest = max(abs(root) for root in A.zeros + B.zeros + W_a.poles + units.Lambda.zeros)
     W2 = W_a * A * B.inverse()
@@ -66,18 +65,9 @@ def stabiliser_problem(
     return units, Problem(units.G_A, W1, W2, decay_rate)
 
 
-def reference_omegas(period_s: float | Sequence[float]) -> tuple[float, ...]:
-    """The angular frequencies in rad/s of periods in s; raises InputError at the first that is no positive number."""
-    periods = np.atleast_1d(np.asarray(period_s, dtype=float))
-    for period in periods:
-        if not (math.isfinite(period) and period > 0):
-            raise InputError(f"the period is {period:g} s; expected a positive number")
-    return tuple(2 * math.pi / float(period) for period in periods)
-
-
 def design_delay_free(
     model: IdentifiedModel,
-    period_s: float | Sequence[float],
+    reference_omegas: Sequence[float],
     epsilon: float | None,
     recovery_s: float | None = None,
     sector: float | None = None,
@@ -90,8 +80,8 @@ def design_delay_free(
     ----------
     model
         P (its dead time is ignored, as the thesis does) and W_a.
-    period_s
-        Period of the sinusoidal reference in seconds; several for a sum of sinusoids, each once.
+    reference_omegas
+        Angular frequencies of the reference in rad/s, above 0, each once.
     epsilon
         Of the factor s^2 + epsilon of Lambda, in rad^2/s^2. None for integral action, which is ours: Lambda has
         s^(integrators + 1) in place of that factor.
@@ -114,7 +104,7 @@ def design_delay_free(
     reference and a constant disturbance at the plant's input leave no error.
     """
     plant, bound = model.plant, model.additive_bound
-    units, problem = stabiliser_problem(plant, bound, period_s, epsilon)
+    units, problem = stabiliser_problem(plant, bound, reference_omegas, epsilon)
     K, synthesis = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
     own_s = math.log(1 / SETTLED) / (2 * problem.decay_rate)
     forward = K * plant_denominator(plant) * units.Lambda.inverse()
@@ -127,7 +117,7 @@ def design_delay_free(
         kind="delay-free",
         plant=plant,
         additive_bound=bound,
-        reference_omegas=reference_omegas(period_s),
+        reference_omegas=tuple(map(float, reference_omegas)),
         blocks={
             "Lambda": units.Lambda,
             "F1": units.F1,
@@ -139,7 +129,7 @@ def design_delay_free(
             "theta2": thesis.kind.theta2(plant.without_delay()),  # Eq. (2.18)
         },
         hinf=synthesis,
-        parameters=DelayFreeParameters(float(np.max(period_s)), epsilon),
+        parameters=DelayFreeParameters(math.tau / min(reference_omegas), epsilon),
         thesis=thesis,
         corrected=corrected,
         signals=model.signals,

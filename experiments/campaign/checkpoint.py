@@ -26,7 +26,16 @@ PART = re.compile(r"part-(\d+)-[0-9a-f]{64}\.parquet")
 PARTS_A_GROUP = 80  # of the file's row groups: 6000 rows
 SYNTHETIC = "plants drawn at random inside W_a, not measured"
 PACKAGES = ("antiwindup-thesis", "numpy", "scipy", "numba", "pyarrow")
-TOLD = ("synthetic", "kind", "design_sha256", "seed", "plants", "limit", "horizon_s")  # in the file's metadata
+TOLD = (
+    "synthetic",
+    "kind",
+    "design_sha256",
+    "seed",
+    "plants",
+    "lower_limit",
+    "limit",
+    "horizon_s",
+)  # in the file's metadata
 TEXTS, WHOLE, FLAGS = ("anti_windup",), ("plant", "events"), ("linear_stable", "diverged", "covered")
 
 
@@ -68,7 +77,8 @@ class CampaignFile:
             "seed": campaign.seed,
             "plants": plants,
             "reference": json.loads(json.dumps(asdict(campaign.reference))),
-            "limit": campaign.limit,
+            "lower_limit": campaign.limits[0],
+            "limit": campaign.limits[1],
             "horizon_s": campaign.horizon_s,
             "chunk": CHUNK,
             "code_sha256": campaign.code_sha256,

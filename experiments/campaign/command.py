@@ -7,7 +7,8 @@ from typing import Any
 
 import click
 
-from experiments.options import DESIGN, positive_limit, sinusoid_options
+from experiments.options import DESIGN, LIMIT_PAIR, asked_limits, sinusoid_options
+from experiments.pair_options import PairCommand
 from identification.base.command_line import together
 from identification.base.errors import InputError
 from identification.base.path_types import OUTPUT_FILE
@@ -27,10 +28,10 @@ plant_options = together(
 """Which plants a campaign has, and where it runs."""
 
 
-@click.command("campaign")
+@click.command("campaign", cls=PairCommand)
 @plant_options
-@click.option("--limit", type=float, required=True, help="Saturation limits +-LIMIT.")
-@click.option("--periods", type=int, default=5, show_default=True, help="Length of a run in periods of the reference.")
+@LIMIT_PAIR
+@click.option("--periods", type=int, default=5, help="Length of a run in periods of the reference.")
 @sinusoid_options
 def campaign_command(
     design: Path,
@@ -39,7 +40,7 @@ def campaign_command(
     scheduler: str | None,
     output: Path,
     anew: bool,
-    limit: float,
+    limit: tuple[float, ...],
     periods: int,
     **reference: Any,
 ) -> None:
@@ -51,9 +52,9 @@ def campaign_command(
     from experiments.asked_reference import sinusoids
     from experiments.campaign.run_campaign import run_campaign
 
-    positive_limit(limit)
+    limits = asked_limits(limit)
     if not 1 <= periods <= MOST_PERIODS:
         raise InputError(f"--periods is {periods}; expected 1 to {MOST_PERIODS}")
     content = read_design(design)
     asked = sinusoids(content, **reference)
-    run_campaign(content, design, plants, seed, asked, limit, periods, scheduler, output, anew)
+    run_campaign(content, design, plants, seed, asked, limits, periods, scheduler, output, anew)

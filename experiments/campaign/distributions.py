@@ -36,7 +36,7 @@ COLUMNS = {
     "guaranteed_sector": "float64",
 }
 COLUMNS |= dict.fromkeys(MEASURES, "float64")
-FACTS = {"plants": int, "seed": int, "limit": float, "horizon_s": float}
+FACTS = {"plants": int, "seed": int, "lower_limit": float, "limit": float, "horizon_s": float}
 
 Columns = dict[str, np.ndarray]
 
@@ -56,8 +56,8 @@ def campaign_tables(path: Path) -> dict[str, pd.DataFrame]:
         recovery_s that so many of them do not exceed. ``campaign_distance``: for each run and each tenth of the
         distance (from, to) the number of plants there, and the shares of them whose linear loop is stable
         (linear_stable), whose run diverges, recovers and is covered by its guarantee; empty where there is no plant.
-        ``campaign_summary``: for each run plants, seed, limit, horizon_s, the four shares among all plants, the
-        guaranteed_sector (0: nothing is guaranteed of these plants), the 5, 50 and 95 % quantiles of the three numbers,
+        ``campaign_summary``: for each run plants, seed, lower_limit, limit, horizon_s, the four shares among all
+        plants, the guaranteed_sector (0: nothing is guaranteed of these plants), the 5, 50 and 95 % quantiles of these,
         and worst_plant, that of the largest steady error; of several, such as those that diverge, the nearest to the
         model.
 

@@ -16,6 +16,7 @@ from experiments.campaign.checkpoint import CampaignFile
 from experiments.campaign.distributions import PERCENT, RUNS, campaign_tables
 from experiments.campaign.run_plants import Campaign, code_sha256
 from experiments.campaign.workers import run_here, run_on_cluster
+from experiments.engine.simulate import limits_text
 from experiments.runs.guarantee import sector_text
 from experiments.runs.references import Reference
 from identification.base import process
@@ -32,7 +33,7 @@ def run_campaign(
     plants: int,
     seed: int,
     reference: Reference,
-    limit: float,
+    limits: tuple[float, float],
     periods: int,
     scheduler: str | None,
     output: Path,
@@ -46,7 +47,7 @@ def run_campaign(
         The design and its file.
     plants, seed
         How many plants are drawn, and from which random numbers.
-    reference, limit, periods
+    reference, limits, periods
         Of every run, see :class:`experiments.campaign.run_plants.Campaign`.
     scheduler
         Address of a Dask cluster's; None runs the campaign here.
@@ -63,7 +64,7 @@ def run_campaign(
             f"--plants is {plants} and --seed {seed}; expected 1 to {MOST_PLANTS} plants, a seed from 0 on"
         )
     digest = hashlib.sha256(read_bytes(design)).hexdigest()
-    campaign = Campaign(content, digest, seed, reference, limit, periods, code_sha256())
+    campaign = Campaign(content, digest, seed, reference, limits, periods, code_sha256())
     with locked_file(output):
         file = CampaignFile(output, campaign, plants, design, anew)
         there = plants - sum(last - first for first, last in file.missing)
@@ -72,7 +73,9 @@ def run_campaign(
         click.echo(f"{there} of {plants} plants were there already")
     summary = campaign_tables(output)["campaign_summary"]
     click.echo(_promised(summary))
-    click.echo(f"{plants} plants within W_a -> {output}; limits +-{limit:.6g}, {campaign.horizon_s:.6g} s each")
+    click.echo(
+        f"{plants} plants within W_a -> {output}; limits {limits_text(*limits)}, {campaign.horizon_s:.6g} s each"
+    )
     for line in _lines(summary):
         click.echo(line)
 

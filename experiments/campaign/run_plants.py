@@ -45,8 +45,8 @@ class Campaign:
         Not negative.
     reference
         r(t) of every run.
-    limit
-        Saturation limits +-limit.
+    limits
+        Saturation limits, (lower, upper).
     periods
         Length of a run in :attr:`span_s`.
     code_sha256
@@ -57,7 +57,7 @@ class Campaign:
     design_sha256: str
     seed: int
     reference: Reference
-    limit: float
+    limits: tuple[float, float]
     periods: int
     code_sha256: str
 
@@ -191,7 +191,7 @@ class _Runner:
     def _metrics(self, plant: PlantModel, controller: Controller, given: Guarantee) -> dict[str, Any]:
         loop = plant_loop(controller, plant, self.reference)
         loop = replace(loop, outputs={"error": loop.outputs["error"]})  # the others need not be read
-        limits = (-self.campaign.limit, self.campaign.limit)
+        limits = self.campaign.limits
         promised = {"guaranteed_sector": given.sector, "covered": False, "largest_control": None, "needed_sector": None}
         try:
             run = simulate(loop, limits, self.time_s)

@@ -47,7 +47,7 @@ class Drive:
         (sigma_1, sigma_2) of the saturation, sigma_1 < sigma_2, either may be infinite; one number is +- that.
     quantum
         Distance of the actuator's levels, whole multiples of it within the limits; 0 is none.
-    slew
+    rate_limit
         The most that the actuator's output changes in a second; inf is no limit.
     input_delay_s
         From the sampling instant to the actuator's answer: computation and transport.
@@ -60,7 +60,7 @@ class Drive:
     method: str
     limits: tuple[float, float]
     quantum: float = 0.0
-    slew: float = math.inf
+    rate_limit: float = math.inf
     input_delay_s: float = 0.0
     resolution: float = 0.0
 
@@ -73,8 +73,10 @@ class Drive:
             raise InputError(f"the method is '{self.method}'; expected {' or '.join(METHODS)}")
         if not 0 <= self.quantum < math.inf:
             raise InputError(f"the quantum is {self.quantum:g}; expected a number that is not negative, 0 for none")
-        if not self.slew > 0:
-            raise InputError(f"the slew is {self.slew:g} a second; expected a positive number, inf for no limit")
+        if not self.rate_limit > 0:
+            raise InputError(
+                f"the rate limit is {self.rate_limit:g} a second; expected a positive number, inf for no limit"
+            )
         if not 0 <= self.input_delay_s < math.inf:
             raise InputError(f"the input delay is {self.input_delay_s:g} s; expected a number that is not negative")
         if not 0 <= self.resolution < math.inf:
@@ -98,7 +100,7 @@ class Drive:
     def actuator(self) -> Actuator:
         """What the compiled steps take of the actuator."""
         low, high = self.limits
-        return Actuator(float(low), float(high), float(self.quantum), *self.levels, float(self.slew))
+        return Actuator(float(low), float(high), float(self.quantum), *self.levels, float(self.rate_limit))
 
 
 @dataclass(frozen=True, repr=False)
@@ -267,7 +269,7 @@ def _actuator(drive: Drive, command: np.ndarray, start: np.ndarray) -> np.ndarra
     """The actuator's output at the sampling instants from the commands (s,) and where it stands as each is issued."""
     whole, rest = split(min(drive.input_delay_s, (len(command) + 2) / drive.rate_hz), 1 / drive.rate_hz)
     late, since = (whole + 1, (1 - rest) / drive.rate_hz) if rest else (whole, 0.0)
-    reach = drive.slew * since if math.isfinite(drive.slew) else math.inf
+    reach = drive.rate_limit * since if math.isfinite(drive.rate_limit) else math.inf
     moved = start + np.clip(command - start, -reach, reach)
     before = np.full(min(late, len(moved)), start[0])
     return np.concatenate([before, moved[: len(moved) - len(before)]])

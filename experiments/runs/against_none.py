@@ -11,7 +11,7 @@ from design.blocks.block import fastest_root, plant_block
 from design.design_file import Design
 from experiments.engine.compiled_loop import FURTHEST as STEP
 from experiments.engine.saturated_loop import SaturatedLoop
-from experiments.engine.simulate import DivergenceError, Run, limit_pair, simulate
+from experiments.engine.simulate import DivergenceError, Run, limit_pair, limits_text, simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference
 from experiments.runs.region import longest_run, require_within_region
@@ -76,24 +76,19 @@ class Comparison:
         """A sentence for each anti-windup, those that are worse than none first; one where no run reaches a limit."""
         if all(each.largest_control <= 1 for each in self.outcomes.values()):
             return (
-                f"no anti-windup acts under the limits {self._limits}: |u| reaches "
+                f"no anti-windup acts under the limits {limits_text(*self.limits)}: |u| reaches "
                 f"{self.outcomes['none'].largest_control:.3g} times the limit"
             )
         names = sorted((name for name in self.outcomes if name != "none"), key=lambda name: not self.is_worse(name))
         return "\n".join(self._sentence(name) for name in names)
-
-    @property
-    def _limits(self) -> str:
-        low, high = self.limits
-        return f"+-{high:.4g}" if low == -high else f"{low:.4g} to {high:.4g}"
 
     def _sentence(self, name: str) -> str:
         own, none = self.outcomes[name], self.outcomes["none"]
         did = [self._did(each) for each in (own, none)]
         worse = "WORSE" if self.is_worse(name) else "no worse"
         return (
-            f"{name} is {worse} than no anti-windup under the limits {self._limits}, from rest under a reference that "
-            f"begins at its crest: it {did[0]}; none {did[1]}"
+            f"{name} is {worse} than no anti-windup under the limits {limits_text(*self.limits)}, from rest under a "
+            f"reference that begins at its crest: it {did[0]}; none {did[1]}"
         )
 
     def _did(self, outcome: Outcome) -> str:

@@ -44,7 +44,7 @@ class Reference:
     omegas
         In rad/s, not negative; as many as there are amplitudes.
     phases_rad
-        In radians; as many.
+        In radians; as many. No constant has a phase of sine 0, unless its amplitude is 0.
     """
 
     amplitudes: tuple[float, ...]
@@ -59,6 +59,12 @@ class Reference:
                 f"the reference has {len(self.omegas)} frequencies, {len(self.amplitudes)} amplitudes and "
                 f"{len(self.phases_rad)} phases; expected as many of each, and one at least"
             )
+        for amplitude, omega, phase in zip(self.amplitudes, self.omegas, self.phases_rad, strict=True):
+            if amplitude != 0 and omega == 0 and math.sin(phase) == 0:
+                raise InputError(
+                    f"the reference of frequency 0 has the phase {phase:g}, with which it is 0 at all times; expected "
+                    "the phase pi/2, with which it is the constant of its amplitude"
+                )
         numbers = {
             "amplitude": self.amplitudes,
             "frequency": self.omegas,

@@ -90,11 +90,11 @@ def robustness(designs: tuple[Path, ...], output: Path) -> None:
     write_into(output, robustness_tables({name: read_design(path) for name, path in zip(names, designs, strict=True)}))
 
 
-@thesis.command("delay-free")
+@thesis.command("chapter-2")
 @DESIGN
 @LIMIT
 @OUTPUT_FOLDER
-def delay_free(design: Path, limit: float | None, output: Path) -> None:
+def chapter_2(design: Path, limit: float | None, output: Path) -> None:
     """The chapter 2 loop: delay_free.csv, delay_free_summary.csv."""
     from design.design_file import read_design
     from experiments.thesis.studies.chapter_2 import delay_free_tables
@@ -102,11 +102,11 @@ def delay_free(design: Path, limit: float | None, output: Path) -> None:
     write_into(output, delay_free_tables(read_design(design, "delay-free"), positive_limit(limit)))
 
 
-@thesis.command("extended")
+@thesis.command("chapter-4")
 @DESIGN
 @LIMIT
 @OUTPUT_FOLDER
-def extended(design: Path, limit: float | None, output: Path) -> None:
+def chapter_4(design: Path, limit: float | None, output: Path) -> None:
     """The chapter 4 loop: extended.csv, extended_summary.csv."""
     from design.design_file import read_design
     from experiments.thesis.studies.chapter_4 import extended_tables
@@ -203,10 +203,11 @@ def campaign(
     from experiments.thesis.studies.conditions import usual_limit, usual_periods
 
     content = read_design(design)
-    given = positive_limit(limit)
-    limit = usual_limit(content) if given is None else given
+    given = positive_limit(limit) or usual_limit(content)
     reference = thesis_reference(content.kind, content.reference_omegas)
-    run_campaign(content, design, plants, seed, reference, limit, usual_periods(content), scheduler, output, anew)
+    run_campaign(
+        content, design, plants, seed, reference, (-given, given), usual_periods(content), scheduler, output, anew
+    )
 
 
 @thesis.command("additive-error")

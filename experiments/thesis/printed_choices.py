@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from math import tau
 
 from data.thesis import model_named, printed_numbers
 from design.chapter_2.design_delay_free import design_delay_free
@@ -23,7 +24,7 @@ def chapter_2(set_name: str = "implied") -> Design:
     """
     chosen = printed_numbers()["delay_free"]
     model = model_named(set_name)
-    return design_delay_free(model, chosen["reference"]["period_s"], chosen["epsilon"])
+    return design_delay_free(model, [tau / chosen["reference"]["period_s"]], chosen["epsilon"])
 
 
 @cache

@@ -16,6 +16,7 @@ from identification.base.console import Console
 from identification.base.errors import InputError, printable
 from identification.base.files import write_protected_too
 
+HELP = {"show_default": True, "help_option_names": ["-h", "--help"]}  # of every command
 QUOTED = 80  # characters of a value in a sentence
 WRITTEN = {"output", "page", "build", "responses", "record"}  # options that name what a command writes
 EXTRAS = {"dask": "campaign", "distributed": "campaign", "pyarrow": "campaign"}  # of pyproject.toml, by their modules
@@ -48,8 +49,12 @@ class CommandGroup(Console):
     the memory does not suffice; and where a module of an extra is not installed. Control characters in a sentence,
     which may come from a file or a name, are shown as escapes, and what it quotes is cut.
 
-    A command that writes takes ``--force`` too.
+    A command that writes takes ``--force`` too. Every help shows the defaults; ``-h`` is ``--help``.
     """
+
+    def __init__(self, *args: Any, **attributes: Any) -> None:
+        super().__init__(*args, **{"context_settings": HELP} | attributes)
+        click.version_option(package_name="antiwindup-thesis")(self)
 
     def add_command(self, cmd: click.Command, name: str | None = None) -> None:
         names = {param.name for param in cmd.params}

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pandas as pd
 
+from experiments.engine.simulate import limits_text
 from experiments.runs.guarantee import sector_text
 from experiments.runs.metrics import settling_time
 from identification.base.digits import lower_end, told_apart, upper_end
@@ -66,6 +67,11 @@ def fraction(value: float) -> str:
 def only(summary: pd.DataFrame, column: str) -> float:
     """Return the value of a column in a summary of one row."""
     return float(summary[column].iloc[0])
+
+
+def of_limits(summary: pd.DataFrame) -> str:
+    """Return the limits of the runs in a summary, ``+-12`` or ``-3 to 12``."""
+    return limits_text(float(summary["lower_limit"].iloc[0]), float(summary["limit"].iloc[0]))
 
 
 def of_run(summary: pd.DataFrame, run: str, column: str) -> float:

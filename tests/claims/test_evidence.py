@@ -1,6 +1,7 @@
 """Why the ledger's ``differs`` and ``not_reproducible`` rows are so: each reason, shown."""
 
 from dataclasses import replace
+from math import tau
 
 import numpy as np
 import pandas as pd
@@ -31,7 +32,7 @@ from identification.model.model_file import IdentifiedModel
 @pytest.fixture(scope="module")
 def delay_free_design(implied: IdentifiedModel) -> Design:
     chosen = printed_numbers()["delay_free"]
-    return design_delay_free(implied, chosen["reference"]["period_s"], chosen["epsilon"])
+    return design_delay_free(implied, [tau / chosen["reference"]["period_s"]], chosen["epsilon"])
 
 
 @pytest.fixture(scope="module")

@@ -142,7 +142,15 @@ def campaign_tables() -> Tables:
                 distance | {"linear_stable": linear, "diverged": 0.25, "recovered": linear / k, "covered": 0.0}
             )
         )
-        row = {"run": run, "plants": 120, "seed": 17, "limit": 13.5, "horizon_s": 21.25, "linear_stable": 0.625}
+        row = {
+            "run": run,
+            "plants": 120,
+            "seed": 17,
+            "lower_limit": -13.5,
+            "limit": 13.5,
+            "horizon_s": 21.25,
+            "linear_stable": 0.625,
+        }
         row |= {"diverged": 0.25, "recovered": 0.75 - k / 8, "steady_error_50": 10.0 ** (k - 4)}
         row |= {"covered": 0.0, "guaranteed_sector": 0.0}
         rows.append(row | {"recovery_50_s": 3 * k + 1 if run != "thesis" else np.nan})

@@ -37,7 +37,9 @@ import scipy.optimize, scipy.signal, scipy.stats
 
 root, scratch, commands, *rooms = *sys.argv[1:3], json.loads(sys.argv[3]), *sys.argv[4:]
 RUNS = {
-    "design delay-free": ["implied", "--period", "4", "--epsilon", "1e-4", "--output", scratch + "/design.json"],
+    "design delay-free": [
+        *["implied", "--reference-hz", "0.25", "--epsilon", "1e-4", "--output", scratch + "/design.json"]
+    ],
     "design extended": ["implied", "--reference-hz", "0.5", "--output", scratch + "/other.json"],
     "experiments thesis pid": ["--output", scratch],
     "experiments thesis equations": ["--page", scratch + "/equations.md"],

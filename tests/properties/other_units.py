@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import tau
 
 import numpy as np
 
@@ -151,7 +152,7 @@ def small_extended(model: IdentifiedModel, time: float) -> Design:
 
 def small_delay_free(model: IdentifiedModel, time: float) -> Design:
     """Chapter 2 for the small plant, in a unit of time."""
-    return design_delay_free(model, 12.0 * time, 1e-3 / time**2)
+    return design_delay_free(model, [tau / 12.0 / time], 1e-3 / time**2)
 
 
 def same(found: np.ndarray, expected: np.ndarray, share: float) -> None:

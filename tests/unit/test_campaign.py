@@ -129,7 +129,7 @@ def test_another_integrator_or_unstable_pole_is_refused(extended_design: Design)
 @pytest.fixture(scope="module")
 def campaign(extended_design: Design) -> Campaign:
     reference = thesis_reference("extended", extended_design.reference_omegas)
-    return Campaign(extended_design, "of a test", 1, reference, LIMIT, 5, code_sha256())
+    return Campaign(extended_design, "of a test", 1, reference, (-LIMIT, LIMIT), 5, code_sha256())
 
 
 def test_rows_are_those_of_single_runs(campaign: Campaign, extended_design: Design) -> None:
@@ -191,7 +191,7 @@ def test_a_run_that_diverges_is_a_result(campaign: Campaign, monkeypatch: pytest
 def test_a_guarantee_within_the_bound_covers_the_runs_that_need_less(table: IdentifiedModel, limit: float) -> None:
     design = design_extended(table, [1.5], 4.0, [(2.0, 1.0)])
     kind, reference = design.compensator("corrected"), thesis_reference("extended", (1.5,))
-    columns = run_chunk(Campaign(design, f"robust {limit}", 1, reference, limit, 5, code_sha256()), 0, 2)
+    columns = run_chunk(Campaign(design, f"robust {limit}", 1, reference, (-limit, limit), 5, code_sha256()), 0, 2)
     assert columns["guaranteed_sector"] == [0, 0, guarantee_within(design, kind).sector] * 2
     for index, row in ((0, 2), (1, 5)):
         plant = PlantsWithin(design.loop_plant, design.additive_bound).draw(1, index).plant
@@ -212,7 +212,7 @@ def test_a_guarantee_within_the_bound_covers_the_runs_that_need_less(table: Iden
 def test_a_chapter_2_design_runs_too(delay_free_design: Design) -> None:
     """No dead time in its loop: that of the true plant may only grow."""
     reference = thesis_reference("delay-free", delay_free_design.reference_omegas)
-    campaign = Campaign(delay_free_design, "another", 2, reference, 10.0, 6, code_sha256())
+    campaign = Campaign(delay_free_design, "another", 2, reference, (-10.0, 10.0), 6, code_sha256())
     columns = run_chunk(campaign, 1, 2)
     assert columns["delay_s"][0] >= 0
     assert columns["zero_omega_1"][0] != delay_free_design.plant.zero_modes[0].omega

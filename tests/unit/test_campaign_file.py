@@ -39,7 +39,7 @@ def made_up(campaign: Campaign, first: int, last: int) -> Columns:
 @pytest.fixture
 def campaign(extended_design: Design) -> Campaign:
     reference = thesis_reference("extended", extended_design.reference_omegas)
-    return Campaign(extended_design, "of a test", 1, reference, 12.0, 5, code_sha256())
+    return Campaign(extended_design, "of a test", 1, reference, (-12.0, 12.0), 5, code_sha256())
 
 
 @pytest.fixture(autouse=True)

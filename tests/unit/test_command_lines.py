@@ -60,7 +60,7 @@ def test_no_other_command_is(runner: CliRunner) -> None:
 
 EPSILON = ["--epsilon", "1e-4"]
 DESIGN_COMMANDS = {
-    "delay-free": ["--period", "4", *EPSILON],
+    "delay-free": ["--reference-hz", "0.25", *EPSILON],
     "extended": ["--reference-omega", "1.5", "--a", "4", "--e", "2", "--f", "1"],
 }
 
@@ -97,7 +97,9 @@ def test_design_refuses_bad_plants(runner: CliRunner, tmp_path: Path, member: st
     model = tmp_path / "model.json"
     model.write_text(json.dumps(content), encoding="utf-8")
     output = tmp_path / "design.json"
-    result = runner.invoke(design_main, ["delay-free", str(model), "--period", "4", *EPSILON, "--output", str(output)])
+    result = runner.invoke(
+        design_main, ["delay-free", str(model), "--reference-hz", "0.25", *EPSILON, "--output", str(output)]
+    )
     refused(result, "model.json", part)
     assert not output.exists()
 
@@ -105,17 +107,26 @@ def test_design_refuses_bad_plants(runner: CliRunner, tmp_path: Path, member: st
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (["delay-free", "implied", "--period", "-4", *EPSILON], "period"),
-        (["delay-free", "implied", "--period", "nan", *EPSILON], "period"),
-        (["delay-free", "implied", "--period", "4", "--epsilon", "99"], "epsilon"),
-        (["delay-free", "implied", "--period", "4"], "of --epsilon and --integral-action none is given"),
-        (["delay-free", "implied", "--period", "4", *EPSILON, "--integral-action"], "both are given; expected one"),
-        (["delay-free", "implied", "--period", "4", "--period", "4", *EPSILON], "expected each frequency once"),
+        (["delay-free", "implied", "--reference-hz", "-0.25", *EPSILON], "expected one or more positive numbers"),
+        (["delay-free", "implied", "--reference-hz", "nan", *EPSILON], "expected one or more positive numbers"),
+        (["delay-free", "implied", "--reference-hz", "0.25", "--epsilon", "99"], "epsilon"),
+        (["delay-free", "implied", "--reference-hz", "0.25"], "of --epsilon and --integral-action none is given"),
+        (
+            ["delay-free", "implied", "--reference-hz", "0.25", *EPSILON, "--integral-action"],
+            "both are given; expected one",
+        ),
+        (
+            ["delay-free", "implied", "--reference-hz", "0.25", "--reference-hz", "0.25", *EPSILON],
+            "expected each frequency once",
+        ),
         (["extended", "implied", "--reference-omega", "0", "--a", "4", "--e", "2", "--f", "1"], "0 frequencies above"),
         (["extended", "implied", "--reference-omega", "-1", "--a", "4", "--e", "2", "--f", "1"], "omega >= 0"),
         (["extended", "implied", "--reference-omega", "1.5", "--a", "4", "--e", "2"], "--f 0 times"),
-        (["delay-free", "implied", "--period", "4", *EPSILON, "--sector", "1"], "0 < sector < 1"),
-        (["delay-free", "implied", "--period", "4", *EPSILON, "--bandwidth", "0.1"], "bandwidth of the anti-windup"),
+        (["delay-free", "implied", "--reference-hz", "0.25", *EPSILON, "--sector", "1"], "0 < sector < 1"),
+        (
+            ["delay-free", "implied", "--reference-hz", "0.25", *EPSILON, "--bandwidth", "0.1"],
+            "bandwidth of the anti-windup",
+        ),
         (["extended", "implied", "--reference-omega", "1.5", "--a", "4", "--e", "-2", "--f", "1"], "unstable"),
         (
             [
@@ -146,20 +157,32 @@ def test_integral_action_hides_no_integrator(runner: CliRunner, tmp_path: Path) 
     written = {}
     for option in (EPSILON, ["--integral-action"]):
         output = tmp_path / "design.json"
-        arguments = ["delay-free", "implied", "--period", "4", "--period", "1.5", *option, "--output", str(output)]
+        arguments = [
+            "delay-free",
+            "implied",
+            "--reference-hz",
+            "0.25",
+            "--reference-hz",
+            "0.7",
+            *option,
+            "--output",
+            str(output),
+        ]
         result = runner.invoke(design_main, arguments)
         assert result.exit_code == 0
         assert ("C hides the integrator of the plant" in result.output) == (option is EPSILON)
         written[option[0]] = read_design(output)
     for name, design in written.items():
-        assert design.reference_omegas == (2 * math.pi / 4, 2 * math.pi / 1.5)
+        assert design.reference_omegas == (math.tau * 0.25, math.tau * 0.7)
         C = design.controller_parts()[0]
         assert (0 in C.zeros, 0 in C.poles) == ((True, False) if name == "--epsilon" else (False, True))
 
 
 def test_design_refuses_a_missing_folder(runner: CliRunner, tmp_path: Path) -> None:
     output = tmp_path / "nowhere" / "design.json"
-    result = runner.invoke(design_main, ["delay-free", "implied", "--period", "4", *EPSILON, "--output", str(output)])
+    result = runner.invoke(
+        design_main, ["delay-free", "implied", "--reference-hz", "0.25", *EPSILON, "--output", str(output)]
+    )
     refused(result, "cannot be written")
 
 
@@ -262,7 +285,7 @@ def test_simulate_refuses_bad_numbers(
     assert not output.exists()
 
 
-@pytest.mark.parametrize("command", ["simulate", "f-gamma", "delay-free", "extended", *APPENDIX])
+@pytest.mark.parametrize("command", ["simulate", "f-gamma", "chapter-2", "chapter-4", *APPENDIX])
 def test_experiments_refuse_a_missing_design(runner: CliRunner, tmp_path: Path, command: str) -> None:
     options = (
         [*SIMULATE, "--output", str(tmp_path / "run.csv")] if command == "simulate" else ["--output", str(tmp_path)]
@@ -274,7 +297,7 @@ def test_experiments_refuse_a_missing_design(runner: CliRunner, tmp_path: Path, 
 
 
 def test_experiments_refuse_the_other_kind(runner: CliRunner, tmp_path: Path, extended_json: Path) -> None:
-    result = runner.invoke(experiments_main, ["thesis", "delay-free", str(extended_json), "--output", str(tmp_path)])
+    result = runner.invoke(experiments_main, ["thesis", "chapter-2", str(extended_json), "--output", str(tmp_path)])
     refused(result, "kind is 'extended'", "expected 'delay-free'")
 
 
@@ -282,7 +305,7 @@ def test_experiments_refuse_a_missing_block(runner: CliRunner, tmp_path: Path, e
     content = json.loads(extended_json.read_text(encoding="utf-8"))
     del content["blocks"]["T_so"]
     extended_json.write_text(json.dumps(content), encoding="utf-8")
-    result = runner.invoke(experiments_main, ["thesis", "extended", str(extended_json), "--output", str(tmp_path)])
+    result = runner.invoke(experiments_main, ["thesis", "chapter-4", str(extended_json), "--output", str(tmp_path)])
     refused(result, "extended.json", "'T_so' is missing")
 
 
@@ -332,7 +355,7 @@ def test_outputs_are_files_and_links_are_followed(runner: CliRunner, tmp_path: P
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (["delay-free", "implied", "--period", "1e-300", *EPSILON], ""),
+        (["delay-free", "implied", "--reference-hz", "1e300", *EPSILON], ""),
         (["extended", "implied", "--reference-omega", "1.5", "--a", "1e300", "--e", "2", "--f", "1"], ""),
     ],
 )

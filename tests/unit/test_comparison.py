@@ -57,18 +57,20 @@ def test_no_run_is_below_the_physical_limit(table: pd.DataFrame) -> None:
     assert (start["peak_error"] >= start["least_peak_error"]).all()
 
 
-def test_the_numbers_are_those_of_a_run(late_integrator: Design) -> None:
+@pytest.mark.parametrize(("given", "low", "limit"), [(None, -1.2 * 7.5, 1.2 * 7.5), ((-6.0, 9.5), -6.0, 9.5)])
+def test_the_numbers_are_those_of_a_run(
+    late_integrator: Design, given: tuple[float, float] | None, low: float, limit: float
+) -> None:
     """The loop without saturation is y_lin of the saturated one here; it comes from another run there."""
-    tables = comparison_tables(late_integrator, REFERENCE)
-    limit, begin = 1.2 * 7.5, 4 * PERIOD
-    pulse = Disturbances(input=steps([(limit, begin), (0.0, begin + PERIOD / 10)]))
+    tables, begin = comparison_tables(late_integrator, REFERENCE, given), 4 * PERIOD
+    pulse = Disturbances(input=steps([((limit - low) / 2, begin), (0.0, begin + PERIOD / 10)]))
     time_s = np.linspace(0.0, 8 * PERIOD, 16001)
-    run = simulate(design_loop(late_integrator, REFERENCE, "observer", None, pulse), (-limit, limit), time_s)
+    run = simulate(design_loop(late_integrator, REFERENCE, "observer", None, pulse), (low, limit), time_s)
     away = np.abs(run.outputs["output"] - run.outputs["y_lin"]) > 0.1
     rows = tables["compare"].query("run == 'observer'").set_index("upset")
     for upset, start_s in (("start", 0.0), ("pulse", begin)):
         counts = (time_s >= start_s - 1e-9) & (time_s <= start_s + 4 * PERIOD + 1e-9)
-        assert rows["limit"][upset] == pytest.approx(limit)
+        assert rows[["lower_limit", "limit"]].loc[upset].tolist() == pytest.approx([low, limit])
         assert rows["recovery_s"][upset] == pytest.approx(time_s[counts & away][-1] - start_s, abs=5e-3)
         assert rows["largest_control"][upset] == pytest.approx(np.abs(run.control[counts]).max() / limit, rel=1e-6)
         events = run.events_s[(run.events_s >= start_s) & (run.events_s <= start_s + 4 * PERIOD)]

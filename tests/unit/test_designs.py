@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
@@ -93,7 +94,7 @@ def test_delay_free_blocks_follow_from_each_other(delay_free_design: Design) -> 
 @pytest.mark.parametrize("name", OTHERS)
 def test_delay_free_design_of_other_plants(implied: IdentifiedModel, name: str, period: float) -> None:
     other = other_model(name, implied)
-    design = design_delay_free(other, period, 1e-4)
+    design = design_delay_free(other, [math.tau / period], 1e-4)
     assert design.hinf is not None
     assert design.hinf.gamma_lower <= design.hinf.gamma
     assert design.hinf.gamma_line <= 1.021 * design.hinf.gamma_line_lower

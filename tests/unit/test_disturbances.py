@@ -137,7 +137,7 @@ def test_a_true_plant_that_jumps_a_dead_time_later(extended_design: Design, rate
     reference, disturbances = sinusoid(20.0, 1.5, 0.3), Disturbances(input=steps([(2.0, 0.2)]))
     loop, errors = design_loop(extended_design, reference, "corrected", plant, disturbances), []
     for rate in (1000.0, 16000.0):
-        drive = Drive(rate, "tustin", (-8.0, 9.0), slew=rate_limit)
+        drive = Drive(rate, "tustin", (-8.0, 9.0), rate_limit=rate_limit)
         run = simulate_sampled(extended_design, reference, "corrected", drive, 0.7, plant, disturbances=disturbances)
         exact = simulate(loop, (-8.0, 9.0), run.time_s, rate=rate_limit)
         errors.append(np.quantile(np.abs(run.output - exact.outputs["output"]), 0.95))

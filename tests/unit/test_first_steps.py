@@ -137,7 +137,7 @@ def designs() -> dict[str, Design]:
             IdentifiedModel(one_mode, BOUND), [1.5], 4.0, [(2.0, 1.0)], inverse_epsilon=0.01
         ),
         "thesis": design_extended(IdentifiedModel(one_mode, BOUND), [1.5], 4.0, [(2.0, 1.0)]),
-        "delay-free": design_delay_free(IdentifiedModel(integrator(0.0), BOUND), 4.0, 1e-4),
+        "delay-free": design_delay_free(IdentifiedModel(integrator(0.0), BOUND), [math.tau / 4.0], 1e-4),
     }
 
 

@@ -98,7 +98,7 @@ def test_files_that_are_no_reference_and_what_is_read_is_not_written(
 
 
 def test_sampled_writes_the_run(extended_design: Design, design_json: Path) -> None:
-    drive = ["--quantum", "0.01", "--slew", "500", "--input-delay", "0.001", "--plant", "table", "--phase", "1"]
+    drive = ["--quantum", "0.01", "--rate-limit", "500", "--input-delay", "0.001", "--plant", "table", "--phase", "1"]
     result = invoke("sampled", design_json, *drive, "--amplitude", "30")
     table = written(result, design_json)
     assert list(table) == ["time_s", "reference", "output", "error", "control", "saturated_control"]
@@ -138,7 +138,7 @@ def test_sampled_without_limits(design_json: Path) -> None:
         (["--until", "0.001"], "expected a finite time of one sample"),
         (["--limit", "-1"], "--limit is -1"),
         (["--quantum", "-1"], "the quantum is -1"),
-        (["--slew", "0"], "the slew is 0"),
+        (["--rate-limit", "0"], "the rate limit is 0"),
         (["--input-delay", "-1"], "the input delay is -1 s"),
         (["--method", "euler"], "euler"),
         (["--amplitude", "nan"], "expected finite numbers"),

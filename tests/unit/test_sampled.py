@@ -208,8 +208,8 @@ def driven(run: SampledRun, drive: Drive, plant: PlantModel) -> tuple[np.ndarray
     times, values = [0.0], [0.0]  # corners of the actuator's output
     for k, wanted in enumerate(command):
         start, end = k * T + drive.input_delay_s, (k + 1) * T + drive.input_delay_s
-        times += [start, min(start + abs(wanted - values[-1]) / drive.slew, end)]
-        moved = np.clip(wanted - values[-1], -drive.slew * T, drive.slew * T)
+        times += [start, min(start + abs(wanted - values[-1]) / drive.rate_limit, end)]
+        moved = np.clip(wanted - values[-1], -drive.rate_limit * T, drive.rate_limit * T)
         values += [values[-1], values[-1] + moved]
     block = plant_block(plant)
     A, B, C, _ = zpk2ss(block.zeros, block.poles, block.gain)
@@ -400,8 +400,8 @@ def test_an_algebraic_loop_without_one_solution_is_refused(other_design: Design)
         ({"quantum": -0.1}, "the quantum is -0.1"),
         ({"quantum": math.inf}, "the quantum is inf"),
         ({"quantum": 4.0, "limits": (1.0, 3.0)}, "no multiple of the quantum 4 lies within 1 and 3"),
-        ({"slew": 0.0}, "the slew is 0"),
-        ({"slew": math.nan}, "the slew is nan"),
+        ({"rate_limit": 0.0}, "the rate limit is 0"),
+        ({"rate_limit": math.nan}, "the rate limit is nan"),
         ({"input_delay_s": -1e-3}, "the input delay is -0.001 s"),
         ({"input_delay_s": math.inf}, "the input delay is inf"),
     ],

@@ -363,7 +363,7 @@ def test_simulate_says_first_whether_its_run_is_covered(
 def test_a_drive_says_first_whether_its_run_is_covered(
     extended_design: Design, limit: str, anti_windup: str, begins: str, tmp_path: Path
 ) -> None:
-    drive = ("--rate", "2000", "--method", "tustin", "--quantum", "0.006", "--slew", "2000")
+    drive = ("--rate", "2000", "--method", "tustin", "--quantum", "0.006", "--rate-limit", "2000")
     assert said(
         "sampled", extended_design, tmp_path, *drive, "--limit", limit, "--anti-windup", anti_windup
     ).startswith(begins)

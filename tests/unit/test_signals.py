@@ -37,6 +37,6 @@ def test_a_name_that_does_not_fit_on_an_axis_is_refused(field: str, value: str) 
 def test_model_and_designs_keep_them(implied: IdentifiedModel, tmp_path: Path) -> None:
     model, design = tmp_path / "model.json", tmp_path / "design.json"
     model.write_text(replace(implied, signals=MOTOR).to_json())
-    for made in (design_extended(read_model(model), [1.5]), design_delay_free(read_model(model), 4.0, 1e-4)):
+    for made in (design_extended(read_model(model), [1.5]), design_delay_free(read_model(model), [1.5], 1e-4)):
         design.write_text(made.to_json())
         assert read_design(design).signals == MOTOR

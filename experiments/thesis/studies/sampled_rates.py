@@ -90,7 +90,7 @@ def sampled_rates_tables(design: Design, limit: float | None = None) -> dict[str
                     method,
                     (-limit, limit),
                     quantum=facts["quantum"],
-                    slew=2 * limit / facts["full_range_s"],
+                    rate_limit=2 * limit / facts["full_range_s"],
                     input_delay_s=LATE / rate,
                 )
                 found = _run(design, reference, kind, drive, horizon)

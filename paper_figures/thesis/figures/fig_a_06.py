@@ -13,7 +13,7 @@ from matplotlib.ticker import NullFormatter
 
 from experiments.runs.guarantee import sector_text
 from paper_figures.look import panels
-from paper_figures.look.captions import number, of_run, only
+from paper_figures.look.captions import number, of_limits, of_run, only
 from paper_figures.look.panels import CORRECTED, NONE, THESIS
 from paper_figures.look.style import FULL_WIDTH, LINES, styled
 
@@ -41,7 +41,7 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     return (
         "What the anti-windup does over the plants that W_a admits (not in the thesis). SYNTHETIC: "
         f"{plants} plants that we drew (seed {int(only(summary, 'seed'))}), each in the loop of the same design, under "
-        f"the limits +-{number(only(summary, 'limit'))}, for {number(only(summary, 'horizon_s'))} s of the thesis's "
+        f"the limits {of_limits(summary)}, for {number(only(summary, 'horizon_s'))} s of the thesis's "
         f"reference. {_promised(summary)} How they lie within W_a is a choice of ours, so the shares are no "
         "probabilities of a real plant. "
         "(a) to (c) The share of all the plants whose numbers are no larger: the peak of |e| after a quarter of the "

@@ -14,7 +14,7 @@ from matplotlib.ticker import NullFormatter
 
 from experiments.runs.compare_anti_windups import SETTLED
 from paper_figures.look import panels
-from paper_figures.look.captions import at_least, number, only
+from paper_figures.look.captions import at_least, number, of_limits
 from paper_figures.look.style import FULL_WIDTH, LINES, styled
 
 TABLES: tuple[str, ...] = ("compare", "compare_runs")
@@ -50,11 +50,11 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
         physical = f" From {number(from_s)} s after the start on {forced}."
     return (
         "The anti-windups of others beside the thesis's and the corrected one (not in the thesis), in the same loop of "
-        f"chapter 4 under the limits +-{number(only(table, 'limit'))}. (a) From rest, and (b) after a disturbance as "
-        "large as the limit at the plant's input, for a tenth of a period: how far the output is from that of the loop "
-        "without saturation, over the reference's amplitude; dotted, 1 %, which counts as recovered. (c), (d) The "
-        "recovery time and the greatest |u| over the limit; a full marker guarantees recovery whatever the control, a "
-        f"half one within a sector, an open one nothing. Recovery from rest and after the pulse: {said}.{physical}"
+        f"chapter 4 under the limits {of_limits(table)}. (a) From rest, and (b) after a disturbance of half their "
+        "distance at the plant's input, for a tenth of a period: how far the output is from that of the loop without "
+        "saturation, over the reference's amplitude; dotted, 1 %, which counts as recovered. (c), (d) The recovery time "
+        "and the greatest |u| over the larger limit; a full marker guarantees recovery whatever the control, a half one "
+        f"within a sector, an open one nothing. Recovery from rest and after the pulse: {said}.{physical}"
     )
 
 
