@@ -13,29 +13,33 @@ import click
 
 from identification.base.command_line import CommandGroup
 
-BUILDS = ("refit", "figures", "report")
+COMMANDS = dict.fromkeys(("refit", "figures", "report"), "commands")
+COMMANDS |= {name: f"{name}_command" for name in ("export", "explore")}
+"""Command of this package -> its module."""
 ROOMS = ("identification", "design", "experiments", "paper_figures")
 
 
 class Rooms(CommandGroup):
-    """The builds, and the groups of the rooms, each under its room's name and with its room's first line."""
+    """The commands of this package, and the groups of the rooms, each under its room's name and with its first line."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return [*BUILDS, *ROOMS]
+        return [*COMMANDS, *ROOMS]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name in ROOMS:
             found: click.Command = import_module(f"{cmd_name}.__main__").main
-        elif cmd_name in BUILDS:
-            found = getattr(import_module("antiwindup.commands"), cmd_name)
+        elif cmd_name in COMMANDS:
+            found = getattr(import_module(f"antiwindup.{COMMANDS[cmd_name]}"), cmd_name)
+            self.add_command(found)  # with --force where it writes
         else:
             return None
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Builds"):
-            formatter.write_dl([(name, self.get_command(ctx, name).get_short_help_str(90)) for name in BUILDS])  # type: ignore[union-attr]
-        with formatter.section("Commands"):
+        own = {name: self.get_command(ctx, name) for name in COMMANDS}
+        with formatter.section("From the bench to the drive"):
+            formatter.write_dl([(name, each.get_short_help_str(90)) for name, each in own.items() if each])
+        with formatter.section("Step by step"):
             formatter.write_dl([(room, str(import_module(room).__doc__).splitlines()[0]) for room in ROOMS])
 
 

@@ -23,7 +23,7 @@ from identification.base.command_line import CommandGroup, together
 from identification.base.digits import lower_end, upper_end
 from identification.base.errors import InputError
 from identification.base.files import require_writable, write_whole
-from identification.base.path_types import INPUT_FILE, OUTPUT_FILE
+from identification.base.path_types import FIGURE_FILE, INPUT_FILE, OUTPUT_FILE
 
 if TYPE_CHECKING:
     from design.design_file import Design
@@ -136,7 +136,9 @@ def delay_free(
 @click.option("--a", type=float, help="Closed-loop pole of the free part, rad/s; as fast as W_a allows unless given.")
 @click.option("--e", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
 @click.option("--f", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
-@click.option("--method", type=click.Choice(METHODS), default="zeros", help="How Q is designed.")
+@click.option(
+    "--interpolation", "method", type=click.Choice(METHODS), default="zeros", help="How Q is made to interpolate."
+)
 @click.option("--inverse-epsilon", type=float, default=0.0, help="Of R_eps^-1 = R_0^-1/(1 + eps s)^2 (3.2), s.")
 @click.option(
     "--robust-level",
@@ -229,7 +231,8 @@ def anti_windup_command(design: Path, name: str, numerator: str, denominator: st
     default=1.0,
     help="Integral of u - sat(u), in input unit times second, for the lasting offset.",
 )
-def audit_command(design: Path, windup: float) -> None:
+@click.option("--figure", type=FIGURE_FILE, help="Draw L with W_a's discs, |S|, |T| and |W_a C S|: .pdf, .svg or .png.")
+def audit_command(design: Path, windup: float, figure: Path | None) -> None:
     """Print stability, margins and |W_a C S| of DESIGN with the exact dead time, and judge every anti-windup in it."""
     from design.auditing.as_text import audit_text
     from design.auditing.audit_design import audit
@@ -237,9 +240,16 @@ def audit_command(design: Path, windup: float) -> None:
 
     if not abs(windup) < 1e100:
         raise InputError(f"--windup is {windup:g}; expected a number of less than 1e100")
+    if figure is not None:
+        require_writable(figure, inputs=[design])
     content = read_design(design)
-    click.echo(audit_text(content, audit(content), windup))
-    click.echo(f"\n{_compared(content)}")
+    said = f"{audit_text(content, audit(content), windup)}\n\n{_compared(content)}"
+    if figure is not None:
+        from paper_figures.look.audit_sheet import plot_audit
+        from paper_figures.look.style import figure_writer
+
+        write_whole({figure: figure_writer(plot_audit(content))}, inputs=[design])
+    click.echo(said)
 
 
 def _frequencies(hertz: tuple[float, ...], omegas: tuple[float, ...]) -> tuple[float, ...]:

@@ -19,6 +19,7 @@ from experiments.campaign.command import campaign_command
 from experiments.options import DESIGN, OUTPUT_FOLDER, asked_limits, sinusoid_options
 from experiments.pair_options import NumberPair, PairCommand
 from experiments.run_commands import sampled_command, simulate_command
+from experiments.table_commands import rates_command, tracking_command
 from experiments.tables import write_into
 from experiments.thesis.commands import thesis
 from identification.base.command_line import CommandGroup
@@ -44,6 +45,8 @@ def main() -> None:
 
 main.add_command(simulate_command)
 main.add_command(sampled_command)
+main.add_command(tracking_command)
+main.add_command(rates_command)
 main.add_command(campaign_command)
 main.add_command(thesis)
 
@@ -81,7 +84,8 @@ def limits(design: Path, limits: tuple[tuple[float, ...], ...], output: Path, **
 
     content = read_design(design)
     with tqdm(desc="limits", unit="", disable=None, leave=False) as bar:
-        write_into(output, limits_tables(content, sinusoids(content, **reference), limits, bar.update))
+        asked = sinusoids(content, **reference)
+        write_into(output, limits_tables(content, asked, limits, bar.update, ("none", "corrected")))
 
 
 @main.command("compare", cls=PairCommand)
@@ -90,8 +94,7 @@ def limits(design: Path, limits: tuple[tuple[float, ...], ...], output: Path, **
     "--limit",
     type=NumberPair(),
     metavar="[LOW] HIGH",
-    help="Saturation limits in the actuator's unit, LOW < HIGH, or one number for +- that; unless given, +-1.2 times "
-    "what the reference needs.",
+    help="Saturation limits in the actuator's unit; +- 1.2 times what the reference needs unless given.",
 )
 @sinusoid_options
 @OUTPUT_FOLDER
@@ -104,11 +107,10 @@ def compare(design: Path, limit: tuple[float, ...] | None, output: Path, **refer
     from experiments.comparison import comparison_tables
 
     content = read_design(design)
+    limits = None if limit is None else asked_limits(limit)
     with tqdm(desc="compare", unit="", disable=None, leave=False) as bar:
         asked = sinusoids(content, **reference)
-        write_into(
-            output, comparison_tables(content, asked, None if limit is None else asked_limits(limit), bar.update)
-        )
+        write_into(output, comparison_tables(content, asked, limits, bar.update))
 
 
 if __name__ == "__main__":

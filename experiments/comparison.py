@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
@@ -35,7 +35,7 @@ Tick = Callable[[], object]
 def comparison_tables(
     design: Design,
     reference: Reference,
-    limits: float | Sequence[float] | None = None,
+    limits: float | tuple[float, float] | None = None,
     tick: Tick = lambda: None,
     plant: PlantModel | None = None,
 ) -> dict[str, pd.DataFrame]:
@@ -48,8 +48,8 @@ def comparison_tables(
     reference
         r(t).
     limits
-        Of the actuator, (lower, upper) in its unit, or one number for +- that; unless given, +-1.2 times the most that
-        the control of perfect tracking reaches.
+        Of the actuator, (lower, upper), or one number for +- that; unless given, 1.2 times the most that the control
+        of perfect tracking reaches.
     tick
         Called after every run.
     plant
@@ -59,7 +59,7 @@ def comparison_tables(
     -------
     dict
         ``compare``: for every anti-windup two rows. The upset ``start`` begins at rest, ``pulse`` four periods later:
-        a disturbance of half their distance is added to the plant's input for a tenth of a period. Each counts for four
+        half the distance of the limits is added to the plant's input for a tenth of a period. Each counts for four
         periods, and times count from its beginning.
 
         run, upset, refused
@@ -78,22 +78,22 @@ def comparison_tables(
         largest_control, last_error
             The greatest |u| over the larger limit, and the greatest |r - y| of the last period.
         lower_limit, limit, required
-            The last is the most that the control of perfect tracking reaches.
+            The second is the upper limit, the last the most that the control of perfect tracking reaches.
 
         ``compare_runs``: time_s, reference, output_unsaturated, and for every run NAME output_NAME and control_NAME.
 
     Raises
     ------
     InputError
-        A limit is infinite, they are not in order, or perfect tracking needs no control or one without bound.
+        The limits are not finite and in order, or perfect tracking needs no control or one without bound.
     """
     true = design.loop_plant if plant is None else plant
     required = reference.required(true).value
     if limits is None and not 0 < required < np.inf:
         raise InputError(f"the control that the reference needs reaches {required:g}, from which no limit follows")
-    low, high = limit_pair(MULTIPLE * required if limits is None else limits)
-    if not (np.isfinite(low) and np.isfinite(high)):
-        raise InputError(f"the limits are {low:g} and {high:g}; expected finite numbers")
+    low, high = pair = limit_pair(MULTIPLE * required if limits is None else limits)
+    if not np.isfinite(high - low):
+        raise InputError(f"the limits are {low:g} and {high:g}; expected finite ones")
     period = _period(design, reference)
     time_s = np.linspace(0.0, 2 * PERIODS * period, 2 * PERIODS * SAMPLES + 1)
     begin = PERIODS * period
@@ -105,26 +105,22 @@ def comparison_tables(
     runs: dict[str, Run] = {}
     for name, loop in loops.items():
         try:
-            runs |= run_all({name: loop}, (low, high), time_s)
+            runs |= run_all({name: loop}, pair, time_s)
         except InputError as error:
             refused[name] = str(error)
         tick()
-    from_s, least = _least_error(true, reference, (low, high), period)
+    band = SETTLED * reference.amplitude
+    from_s, least = _least_error(true, reference, pair, period)
     rows = []
     for name in ("none", *design.anti_windup, *OTHERS):
-        known: dict[str, object] = {
-            "lower_limit": low,
-            "limit": high,
-            "required": required,
-            "refused": refused.get(name),
-        }
+        known: dict[str, object] = {"lower_limit": low, "limit": high, "required": required}
+        known |= {"refused": refused.get(name)}
         if name in kinds:
             known |= _promised(design, kinds[name], true)
         for upset, start_s in (("start", 0.0), ("pulse", begin)):
             row: dict[str, object] = {"run": name, "upset": upset} | known
             if name in runs:
-                larger, band = max(-low, high), SETTLED * reference.amplitude
-                row |= _row(runs[name], unsaturated, start_s, period, from_s, larger, band)
+                row |= _row(runs[name], unsaturated, start_s, period, from_s, max(-low, high), band)
                 row |= {"least_peak_error": least if upset == "start" else np.nan}
             rows.append(row)
     series = {"time_s": time_s, "reference": reference(time_s), "output_unsaturated": unsaturated}

@@ -11,11 +11,11 @@ import click
 
 from experiments.options import DESIGN, LIMIT_PAIR, asked_limits, disturbance_options, reference_options
 from experiments.pair_options import PairCommand
-from experiments.tables import write_tables
+from experiments.tables import csv_writer
 from identification.base.command_line import together
 from identification.base.errors import InputError
-from identification.base.files import require_writable
-from identification.base.path_types import OUTPUT_FILE
+from identification.base.files import require_writable, write_whole
+from identification.base.path_types import FIGURE_FILE, OUTPUT_FILE
 
 MOST_ROWS = 1e7
 UNJUDGED = "Whether the guarantee covers the run is not judged under disturbances"
@@ -42,6 +42,7 @@ _run_options = together(
         "--plant", help="The true plant: a model.json, table or implied; the design's own model unless given."
     ),
     click.option("--output", type=OUTPUT_FILE, required=True, help="CSV to write."),
+    click.option("--figure", type=FIGURE_FILE, help="Draw the run: .pdf, .svg or .png."),
 )
 
 
@@ -67,6 +68,7 @@ def simulate_command(
     noise: tuple[float, float] | None,
     seed: int | None,
     output: Path,
+    figure: Path | None,
     **reference: Any,
 ) -> None:
     """Run DESIGN from rest: time_s, reference, output, error, control, saturated_control; with noise measured."""
@@ -97,7 +99,7 @@ def simulate_command(
     if numbers and anti_windup != "thesis":
         raise InputError(f"--{next(iter(numbers))} belongs to --anti-windup thesis; found --anti-windup {anti_windup}")
     inputs = _inputs(design, plant, reference["reference"])
-    require_writable(output, inputs=inputs)
+    require_writable(output, *([] if figure is None else [figure]), inputs=inputs)
     content = read_design(design)
     kind = content.chosen(anti_windup)
     if numbers:
@@ -135,7 +137,13 @@ def simulate_command(
     else:
         given = guarantee(content, kind, true)
         promised = str(judge_run(given, loop, limits, run, asked, true or content.loop_plant))
-    write_tables({output: table}, inputs)
+    writers = {output: csv_writer(table)}
+    if figure is not None:
+        from paper_figures.look.plot_run import plot_run
+        from paper_figures.look.style import figure_writer
+
+        writers[figure] = figure_writer(plot_run({anti_windup: run}, limits, content.signals))
+    write_whole(writers, inputs)
     beyond, crossings = ("saturated", "crossings of the limits")
     if math.isfinite(rate_limit):
         beyond, crossings = ("saturated or slewing", "beginnings and ends of saturation or slewing")
@@ -180,6 +188,7 @@ def sampled_command(
     noise: tuple[float, float] | None,
     seed: int | None,
     output: Path,
+    figure: Path | None,
     **reference: Any,
 ) -> None:
     """Run DESIGN's controller on a computer with a real actuator, a row each sample, the columns as of simulate.
@@ -202,7 +211,7 @@ def sampled_command(
     drive = Drive(rate, method, asked_limits(limit), quantum, rate_limit, input_delay, resolution)
     _require_few_rows(until * rate)
     inputs = _inputs(design, plant, reference["reference"])
-    require_writable(output, inputs=inputs)
+    require_writable(output, *([] if figure is None else [figure]), inputs=inputs)
     content = read_design(design)
     kind = content.chosen(anti_windup)
     asked = reference_of(content, **reference)
@@ -224,7 +233,13 @@ def sampled_command(
         if found.covered:
             promised = f"No guarantee on a computer; in continuous time the run would be within it: {found.needs}"
     columns = {name: values for name, values in vars(run).items() if values is not None}
-    write_tables({output: pd.DataFrame(columns)}, inputs)
+    writers = {output: csv_writer(pd.DataFrame(columns))}
+    if figure is not None:
+        from paper_figures.look.plot_run import plot_run
+        from paper_figures.look.style import figure_writer
+
+        writers[figure] = figure_writer(plot_run({anti_windup: run}, drive.limits, content.signals))
+    write_whole(writers, inputs)
     click.echo(_first(promised, f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}"))
 
 

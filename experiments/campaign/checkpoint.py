@@ -26,16 +26,8 @@ PART = re.compile(r"part-(\d+)-[0-9a-f]{64}\.parquet")
 PARTS_A_GROUP = 80  # of the file's row groups: 6000 rows
 SYNTHETIC = "plants drawn at random inside W_a, not measured"
 PACKAGES = ("antiwindup-thesis", "numpy", "scipy", "numba", "pyarrow")
-TOLD = (
-    "synthetic",
-    "kind",
-    "design_sha256",
-    "seed",
-    "plants",
-    "lower_limit",
-    "limit",
-    "horizon_s",
-)  # in the file's metadata
+TOLD = ("synthetic", "kind", "design_sha256", "seed", "plants", "lower_limit", "limit", "horizon_s")
+"""What the file's metadata say."""
 TEXTS, WHOLE, FLAGS = ("anti_windup",), ("plant", "events"), ("linear_stable", "diverged", "covered")
 
 

@@ -57,9 +57,9 @@ def campaign_tables(path: Path) -> dict[str, pd.DataFrame]:
         distance (from, to) the number of plants there, and the shares of them whose linear loop is stable
         (linear_stable), whose run diverges, recovers and is covered by its guarantee; empty where there is no plant.
         ``campaign_summary``: for each run plants, seed, lower_limit, limit, horizon_s, the four shares among all
-        plants, the guaranteed_sector (0: nothing is guaranteed of these plants), the 5, 50 and 95 % quantiles of these,
-        and worst_plant, that of the largest steady error; of several, such as those that diverge, the nearest to the
-        model.
+        plants, the guaranteed_sector (0: nothing is guaranteed of these plants), the 5, 50 and 95 % quantiles of the
+        three numbers, and worst_plant, that of the largest steady error; of several, such as those that diverge, the
+        nearest to the model.
 
     Raises
     ------

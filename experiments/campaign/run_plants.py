@@ -46,7 +46,7 @@ class Campaign:
     reference
         r(t) of every run.
     limits
-        Saturation limits, (lower, upper).
+        (lower, upper), in the actuator's unit.
     periods
         Length of a run in :attr:`span_s`.
     code_sha256

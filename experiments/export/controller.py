@@ -12,30 +12,29 @@ from experiments.drive.sampled_loop import Drive, controller_blocks
 from experiments.runs.guarantee import Guarantee, guarantee, sector_text
 from identification.model.signals import Signals
 
-RESTS = 1e-9  # of the largest number of a standing state's equations: a smaller singular value is 0
+INTEGRATES = 1e-11  # of the largest singular value of 1 - A: with a smaller one a block integrates
+UNSEEN = 1e-9  # of the product of two vectors' lengths: less is 0
 
 
 @dataclass(frozen=True)
 class Standing:
-    """The state in which the controller stands still, a constant applied for ever, for a start without a bump.
+    """The state that starts a controller without a bump: it stands still but for one mode, the slowest.
 
     Parameters
     ----------
     forward
-        Shape (n,): the state of ``forward`` under a constant error, for what it then adds to v beyond d times the error
-        of the sample, which is 1. All 0 where no constant error leaves anything of it: then no state starts it.
+        Shape (n,): the state of ``forward`` that stands still under the error 1.
+    slowest
+        Shape (n,): of its states that give 1, the one that changes least, by the mode whose pole is nearest to 1. None
+        where no state gives anything: the first command is then that of the reference and the measurement.
     feedback, memories
-        Shapes (n,), (m,): the state of ``feedback``, and what each of its memories holds, under v = 1.
+        Shapes (n,), (m,): the state of ``feedback`` that stands still, and what its memories hold, under v = 1.
     """
 
     forward: np.ndarray
+    slowest: np.ndarray | None
     feedback: np.ndarray
     memories: np.ndarray
-
-    @property
-    def is_bumpless(self) -> bool:
-        """Whether the first command can be given; a controller without memory of its error has its command at once."""
-        return bool(np.any(self.forward))
 
 
 @dataclass(frozen=True)
@@ -99,28 +98,38 @@ class SampledController:
         return float(self.forward.d[0] * self.direct / (1 - self.around))
 
     @property
+    def remembered(self) -> int:
+        """How many samples the longest memory goes back, this one included; the length of a ring buffer for all."""
+        return int(max(np.max(block.first + block.length) for block in (self.feedback, self.theta)))
+
+    @property
     def standing(self) -> Standing:
         """The state that a start without a bump sets.
 
         Notes
         -----
-        Of ``feedback``: x = A x + b, one solution, since every pole of it is inside the unit circle. Of ``forward``:
-        x = A x + b e' and C x = 1 for the unknown x and e', which is one linear system and has a solution also where
-        ``forward`` integrates: then e' = 0. A start scales it so that the first command is what is applied. With
-        e' = reference - measurement the whole controller stands still; else it starts as if the error, which had been
-        e' for ever, became reference - measurement at the first sample.
+        Every pole of ``feedback`` is inside the unit circle, so that one state stands still; where ``forward``
+        integrates, none does under an error other than 0, and its integrators are left at 0. Of the mode with the poles
+        q and conj(q) the state of output Re(beta q^k) has the output 1 at k = 0 and at k = 1 with
+        beta = 1 + j Re(q - 1)/Im(q).
         """
-        A, b, C = self.feedback.A, self.feedback.b, self.feedback.C
-        x = np.linalg.solve(np.eye(len(b)) - A, b)
-        A_K, b_K, c_K = self.forward.A, self.forward.b, self.forward.C[0]
-        n = len(b_K)
-        equations = np.block([[np.eye(n) - A_K, -b_K[:, None]], [c_K[None], np.zeros((1, 1))]])
-        scales = 1 / np.maximum(np.abs(equations).max(axis=1), np.finfo(float).tiny)
-        size = np.linalg.svd(scales[:, None] * equations, compute_uv=False)
-        forward = np.zeros(n)
-        if n and size[-1] > RESTS * size[0]:
-            forward = np.linalg.solve(equations, np.eye(n + 1)[-1])[:n]
-        return Standing(forward, x, C @ x + self.feedback.d)
+        A, b, C, d = self.feedback.A, self.feedback.b, self.feedback.C, self.feedback.d
+        feedback = np.linalg.solve(np.eye(len(b)) - A, b)
+        A, b = self.forward.A, self.forward.b
+        forward = np.linalg.pinv(np.eye(len(b)) - A, rcond=INTEGRATES) @ b
+        return Standing(forward, _slowest(A, self.forward.C[0]), feedback, C @ feedback + d)
+
+
+def _slowest(A: np.ndarray, c: np.ndarray) -> np.ndarray | None:
+    """The state x with c x = 1 in the mode of A whose pole is nearest to 1, see :attr:`SampledController.standing`."""
+    poles, modes = np.linalg.eig(A)
+    seen = c @ modes
+    for k in np.argsort(np.abs(poles - 1)):
+        if abs(seen[k]) > UNSEEN * np.linalg.norm(c):
+            q = complex(poles[k])
+            beta = 1 + 1j * (q.real - 1) / q.imag if q.imag else 1.0
+            return np.asarray(np.real(beta * modes[:, k] / seen[k]))
+    return None
 
 
 def sampled_controller(
@@ -166,11 +175,11 @@ def sampled_controller(
 def _promise(given: Guarantee) -> str:
     """What is guaranteed of the saturated loop, in words."""
     if given.sector == 0:
-        return f"no guarantee: {given.missing}"
+        return f"No guarantee: {given.missing}"
     covered = "whatever the control"
     if given.sector < 1:
         covered = f"of runs that need a smaller sector than {sector_text(given.sector)}"
     return (
-        f"in continuous time the windup ends {covered}, if the reference takes a control within the limits; of the "
+        f"In continuous time the windup ends {covered}, if the reference takes a control within the limits; of the "
         "sampled loop nothing is proved"
     )

@@ -11,7 +11,7 @@ import pandas as pd
 from design.design_file import Design
 from experiments.physical_limits.intervals import Interval
 from experiments.physical_limits.least_peak_error import RestLimit, Tick, finite_limits, harmonic, periodic_limit
-from experiments.runs.compare_anti_windups import SETTLED, loops, run_all
+from experiments.runs.compare_anti_windups import NAMES, SETTLED, loops, run_all
 from experiments.runs.metrics import settling_time
 from experiments.runs.references import Reference
 from identification.model.plant import PlantModel
@@ -24,7 +24,11 @@ NEVER = Interval(math.nan, math.nan)
 
 
 def limits_tables(
-    design: Design, reference: Reference, limits: Sequence[float | Sequence[float]], tick: Tick = lambda: None
+    design: Design,
+    reference: Reference,
+    limits: Sequence[float | Sequence[float]],
+    tick: Tick = lambda: None,
+    names: Sequence[str] = NAMES,
 ) -> dict[str, pd.DataFrame]:
     """What the runs without and with anti-windup leave to gain, under several limits.
 
@@ -38,6 +42,8 @@ def limits_tables(
         Of the actuator, each (lower, upper), or one number for +- that.
     tick
         Called after every program and after every set of runs.
+    names
+        The anti-windups that are run, see :meth:`design.design_file.Design.chosen`.
 
     Returns
     -------
@@ -64,7 +70,7 @@ def limits_tables(
     rest = RestLimit(plant, reference, pairs[0], tick=tick)
     summary = rest.table().assign(**_named(pairs[0]))
     evenly = np.linspace(0.0, RUN_PERIODS * reference.period_s, RUN_PERIODS * SAMPLES_PER_PERIOD + 1)
-    time_s, every, rows = np.union1d(evenly, summary["start_s"]), loops(design, reference), []
+    time_s, every, rows = np.union1d(evenly, summary["start_s"]), loops(design, reference, names), []
     for pair in sorted(set(pairs), key=lambda pair: (pair[1] - pair[0], pair)):
         runs = run_all(every, pair, time_s)
         tick()

@@ -1,7 +1,8 @@
-"""What the delay-free and the extended experiment share: one design run without and with each anti-windup."""
+"""One design run without and with its anti-windups: loops, runs, and the tables that say what they do."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -15,21 +16,25 @@ from experiments.engine.simulate import DivergenceError, Run, limit_pair, simula
 from experiments.runs.design_loop import design_loop
 from experiments.runs.guarantee import guarantee
 from experiments.runs.metrics import last_saturation, over_last, settling_time
-from experiments.runs.references import Reference
+from experiments.runs.references import Reference, SampledReference
 from experiments.runs.sector_promise import judge_run
 from experiments.runs.verdict import Verdict
 
 SETTLED = 0.01  # band of the settling time, as a share of the reference's amplitude
+NAMES = ("none", "thesis", "corrected")
+"""No anti-windup, (2.23), and the one with theta1~(0) = -1."""
 
 
-def compensators(design: Design) -> dict[str, AntiWindup | None]:
-    """No anti-windup, the thesis's (2.23), and the corrected one with theta1~(0) = -1."""
-    return {"none": None} | {name: design.compensator(name) for name in ("thesis", "corrected")}
+def compensators(design: Design, names: Sequence[str] = NAMES) -> dict[str, AntiWindup | None]:
+    """The anti-windups of these names, see :meth:`design.design_file.Design.chosen`."""
+    return {name: design.chosen(name) for name in names}
 
 
-def loops(design: Design, reference: Reference) -> dict[str, SaturatedLoop]:
+def loops(
+    design: Design, reference: Reference | SampledReference, names: Sequence[str] = NAMES
+) -> dict[str, SaturatedLoop]:
     """The loop of the design with each of :func:`compensators`."""
-    return {name: design_loop(design, reference, kind) for name, kind in compensators(design).items()}
+    return {name: design_loop(design, reference, kind) for name, kind in compensators(design, names).items()}
 
 
 def span(design: Design, reference: Reference) -> float:
@@ -39,23 +44,30 @@ def span(design: Design, reference: Reference) -> float:
     return 2 * design.corrected.judgement.recovery_s
 
 
-def run_all(loops: Mapping[str, SaturatedLoop], limit: float | Sequence[float], time_s: np.ndarray) -> dict[str, Run]:
+def run_all(
+    loops: Mapping[str, SaturatedLoop],
+    limit: float | Sequence[float],
+    time_s: np.ndarray,
+    rate_limit: float = math.inf,
+) -> dict[str, Run]:
     """Simulate every loop under sat with its limits, one number for +- that; one that diverges has NaN from there on.
+
+    The actuator moves no faster than ``rate_limit`` a second.
 
     An unstable controller (the H-infinity optimum may be one) diverges exponentially once the actuator has
     saturated and no anti-windup holds it: that is a result, and it must not hide the other runs.
     """
-    return {name: _run(loop, limit, time_s) for name, loop in loops.items()}
+    return {name: _run(loop, limit_pair(limit), time_s, rate_limit) for name, loop in loops.items()}
 
 
-def _run(loop: SaturatedLoop, limit: float | Sequence[float], time_s: np.ndarray) -> Run:
+def _run(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarray, rate_limit: float) -> Run:
     try:
-        return simulate(loop, limit_pair(limit), time_s)
+        return simulate(loop, limits, time_s, rate=rate_limit)
     except DivergenceError as error:
         before = time_s[time_s < min(error.time_s, time_s[-1])]
         if len(before) < 2:
             raise
-        part = _run(loop, limit, before)  # in other steps it may pass the bound a little earlier
+        part = _run(loop, limits, before, rate_limit)  # in other steps it may pass the bound a little earlier
         rest = np.full(len(time_s) - len(before), np.nan)
         return replace(
             part,
@@ -67,18 +79,25 @@ def _run(loop: SaturatedLoop, limit: float | Sequence[float], time_s: np.ndarray
 
 
 def verdicts(
-    design: Design, loops: Mapping[str, SaturatedLoop], runs: Mapping[str, Run], limit: float, reference: Reference
+    design: Design,
+    loops: Mapping[str, SaturatedLoop],
+    runs: Mapping[str, Run],
+    limit: float | Sequence[float],
+    reference: Reference | SampledReference,
 ) -> dict[str, Verdict]:
-    """For each run of :func:`loops` with an anti-windup that did not diverge, whether its guarantee covers it."""
-    kinds = {name: kind for name, kind in compensators(design).items() if kind is not None}
+    """For each run of :func:`loops` with an anti-windup, whether its guarantee covers it.
+
+    Of one that diverges, and of one whose actuator was too slow for the control, it says nothing.
+    """
+    kinds = {name: kind for name, kind in compensators(design, list(loops)).items() if kind is not None}
     return {
-        name: judge_run(guarantee(design, kind), loops[name], (-limit, limit), runs[name], reference, design.loop_plant)
+        name: judge_run(guarantee(design, kind), loops[name], limit_pair(limit), run, reference, design.loop_plant)
         for name, kind in kinds.items()
-        if np.isfinite(runs[name].control[-1])
+        if np.isfinite((run := runs[name]).control[-1]) and not np.any(np.abs(run.modes) > 1)
     }
 
 
-def tracking_table(runs: Mapping[str, Run], reference: Reference) -> pd.DataFrame:
+def tracking_table(runs: Mapping[str, Run], reference: Reference | SampledReference) -> pd.DataFrame:
     """time_s, reference and, for every run NAME, output_NAME, error_NAME, control_NAME, saturated_NAME."""
     time_s = next(iter(runs.values())).time_s
     columns = {"time_s": time_s, "reference": reference(time_s)}
@@ -93,9 +112,8 @@ def tracking_table(runs: Mapping[str, Run], reference: Reference) -> pd.DataFram
 def tracking_summary(
     runs: Mapping[str, Run],
     verdicts: Mapping[str, Verdict],
-    limit: float,
-    limit_is_given: bool,
-    reference: Reference,
+    limit: float | Sequence[float],
+    reference: Reference | SampledReference,
     required: float,
     span_s: float,
 ) -> pd.DataFrame:
@@ -108,9 +126,7 @@ def tracking_summary(
     verdicts
         See :func:`verdicts`.
     limit
-        Of the actuator, in its unit.
-    limit_is_given
-        Whether the user gave it; else it is the thesis's, printed or found.
+        Of the actuator, in its unit: (lower, upper), or one number for +- that.
     reference
         r(t).
     required
@@ -121,32 +137,32 @@ def tracking_summary(
     Returns
     -------
     DataFrame
-        run, limit, limit_is_given (0 or 1), required, last_saturation_s (empty: saturated to the end), settling_s
+        run, lower_limit, limit (the upper one), required, last_saturation_s (empty: saturated to the end), settling_s
         (error within 1 % of the reference's amplitude, measured from the lasting offset of the error; empty:
         never), offset and ripple (middle and half distance of the extremes of the error over the last period),
-        peak_error_after_1s (from one second on, as chapter 4 reads its plot; empty: the run is shorter),
-        relative_error_percent (largest error of the last period over the reference's amplitude). A run that diverges
+        relative_error_percent (largest error of the last period over the reference's amplitude; empty where that is
+        0). A run that diverges
         has empty cells. Then, of :mod:`experiments.runs.sector_promise`, guaranteed_sector (0: nothing is guaranteed),
         needed_sector (infinite where v_s reaches a limit), largest_control (the largest |u|) and covered_control (how
         large it may be wherever v_s is; empty too where nothing is guaranteed, or any size is covered), empty for a run
         without anti-windup, by Pade's approximation or that diverges; and covered (0 or 1).
     """
     rows = []
+    low, high = limit_pair(limit)
     for name, run in runs.items():
         error = run.outputs["error"]
         offset, ripple = over_last(run.time_s, error, span_s)
         rows.append(
             {
                 "run": name,
-                "limit": limit,
-                "limit_is_given": int(limit_is_given),
+                "lower_limit": low,
+                "limit": high,
                 "required": required,
                 "last_saturation_s": last_saturation(run),
                 "settling_s": settling_time(run.time_s, error - offset, SETTLED * reference.amplitude),
                 "offset": offset,
                 "ripple": ripple,
-                "peak_error_after_1s": np.abs(error[run.time_s >= 1.0]).max() if run.time_s[-1] >= 1.0 else np.nan,
-                "relative_error_percent": 100 * (abs(offset) + ripple) / reference.amplitude,
+                "relative_error_percent": 100 * (abs(offset) + ripple) / (reference.amplitude or math.nan),
             }
             | _promised(verdicts.get(name))
         )

@@ -203,11 +203,10 @@ def campaign(
     from experiments.thesis.studies.conditions import usual_limit, usual_periods
 
     content = read_design(design)
-    given = positive_limit(limit) or usual_limit(content)
-    reference = thesis_reference(content.kind, content.reference_omegas)
-    run_campaign(
-        content, design, plants, seed, reference, (-given, given), usual_periods(content), scheduler, output, anew
-    )
+    given = positive_limit(limit)
+    used = usual_limit(content) if given is None else given
+    limits, reference = (-used, used), thesis_reference(content.kind, content.reference_omegas)
+    run_campaign(content, design, plants, seed, reference, limits, usual_periods(content), scheduler, output, anew)
 
 
 @thesis.command("additive-error")

@@ -16,6 +16,7 @@ from identification.model.model_file import IdentifiedModel
 from identification.sweeps.response import FrequencyResponse
 from paper_figures.look import panels, style
 from paper_figures.look.bode import draw_distance, draw_magnitude, draw_phase, draw_relative_distance
+from paper_figures.look.frequency_axis import HERTZ
 from paper_figures.summary.of_fit import Paragraph, Table, fitted
 from paper_figures.summary.words import Summary
 
@@ -115,15 +116,15 @@ def _panels(
     )
     places = [grid[row, column] for row in range(2) for column in range(2)]
     magnitude, distance, phase, relative = map(figure.add_subplot, places)
-    draw_magnitude(magnitude, tests, model.plant)
-    draw_phase(phase, tests, model.plant)
+    draw_magnitude(magnitude, model, tests)
+    draw_phase(phase, model, tests)
     touches_omega = [touch.omega for touch in fitted(model).bound.touches]
-    draw_distance(distance, tests, model.plant, model.additive_bound, touches_omega)
-    draw_relative_distance(relative, tests, model.plant, model.additive_bound)
+    draw_distance(distance, model, tests, touches_omega)
+    draw_relative_distance(relative, model, tests)
     for panel in (magnitude, distance):
         panel.tick_params(labelbottom=False, which="both")
     for panel in (phase, relative):
-        panel.set_xlabel(r"$\omega$ [rad/s]")
+        panel.set_xlabel(HERTZ)
     for panel in figure.axes:
         for line in panel.legend(ncols=3, **panels.ABOVE).get_lines():
             line.set_markersize(4)

@@ -126,7 +126,8 @@ def test_a_campaign(small_designs: dict[str, Design], kind: str, units: Units) -
     def rows(each: Units) -> pd.DataFrame:
         design = each.design(small_designs[kind])
         reference = thesis_reference(kind, design.reference_omegas)
-        campaign = Campaign(design, str(each), 1, reference, LIMIT * abs(each.input), 5, code_sha256())
+        limit = LIMIT * abs(each.input)
+        campaign = Campaign(design, str(each), 1, reference, (-limit, limit), 5, code_sha256())
         return pd.DataFrame(run_chunk(campaign, 0, 2))
 
     found, expected = rows(units), rows(Units())

@@ -140,7 +140,7 @@ def test_design_refuses_bad_plants(runner: CliRunner, tmp_path: Path, member: st
                 "2",
                 "--f",
                 "1",
-                "--method",
+                "--interpolation",
                 "poles",
             ],
             "unstable poles",

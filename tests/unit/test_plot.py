@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import tau
 
 import numpy as np
 import pytest
@@ -51,7 +52,7 @@ def test_fit_has_three_panels_with_tests_behind_the_model() -> None:
 
 
 def test_distance_has_the_bound_above_and_rings_where_it_touches(panel: Axes) -> None:
-    draw_distance(panel, [SWEEP], PLANT, BOUND, [60.0])
+    draw_distance(panel, MODEL, [SWEEP], [60.0])
     measured, bound, ring = panel.lines
     assert measured.get_ydata() == pytest.approx(decibel(0.1 * np.abs(PLANT(1j * OMEGA))))
     assert ring.get_ydata() == pytest.approx(decibel(np.abs(BOUND([60.0j]))))
@@ -59,7 +60,7 @@ def test_distance_has_the_bound_above_and_rings_where_it_touches(panel: Axes) ->
 
 
 def test_relative_distance_is_over_the_model(panel: Axes) -> None:
-    draw_relative_distance(panel, [SWEEP], PLANT, BOUND)
+    draw_relative_distance(panel, MODEL, [SWEEP])
     measured, bound = panel.lines
     assert measured.get_ydata() == pytest.approx(np.full(OMEGA.size, -20.0))
     assert bound.get_ydata()[0] == pytest.approx(20 * np.log10(abs(BOUND(10j) / PLANT(10j))))
@@ -68,15 +69,15 @@ def test_relative_distance_is_over_the_model(panel: Axes) -> None:
 def test_a_distance_of_nothing_does_not_stretch_the_panel(panel: Axes) -> None:
     response = SWEEP.response.copy()
     response[100] = PLANT(1j * OMEGA[100]) * (1 + 1e-15)
-    draw_distance(panel, [replace(SWEEP, response=response)], PLANT, BOUND)
+    draw_distance(panel, MODEL, [replace(SWEEP, response=response)])
     assert panel.get_ylim()[0] > -80
 
 
 def test_phase_of_the_tests_is_on_the_models_turn(panel: Axes) -> None:
     turned = replace(SWEEP, response=SWEEP.response * np.exp(0.1j))
-    draw_phase(panel, [turned], PLANT)
+    draw_phase(panel, MODEL, [turned])
     measured, model = panel.lines
-    near = np.interp(OMEGA, model.get_xdata(), model.get_ydata())
+    near = np.interp(OMEGA / tau, model.get_xdata(), model.get_ydata())
     assert measured.get_ydata() - near == pytest.approx(np.full(OMEGA.size, np.degrees(0.1)), abs=0.5)
     assert measured.get_ydata()[-1] < -360
     steps = np.diff(panel.get_yticks())
@@ -92,6 +93,6 @@ def test_phase_of_the_tests_is_on_the_models_turn(panel: Axes) -> None:
     ],
 )
 def test_frequencies_can_be_read_however_narrow_the_band(low: float, high: float, wanted: list[str]) -> None:
-    omega = np.geomspace(low, high, 50)
+    omega = tau * np.geomspace(low, high, 50)
     figure = plot_bode(MODEL, [FrequencyResponse(omega, 1.1 * PLANT(1j * omega), None, "a.csv")])
     assert labels(figure.axes[-1]) == wanted

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +65,20 @@ def test_a_reference_from_a_file(command: str, design_json: Path, reference_csv:
     expected = np.interp(table["time_s"], [0.1, 0.2, 0.7], [0.0, 3.0, -1.0])
     np.testing.assert_allclose(table["reference"], expected, atol=1e-9)
     assert np.abs(table["output"]).max() > 0.5
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_constant_is_its_amplitude_and_never_0_by_its_phase(
+    command: str, extended_design: Design, design_json: Path
+) -> None:
+    constant = replace(extended_design, reference_omegas=(0.0, 1.5))
+    design_json.write_text(constant.to_json(), encoding="utf-8")
+    asked = ["--amplitude", "3", "--amplitude", "0"]
+    zero = invoke(command, design_json, *asked, "--phase", "0", "--phase", "0")
+    refused(
+        zero, design_json, "frequency 0 has the phase 0, with which it is 0 at all times", "expected the phase pi/2"
+    )
+    assert set(written(invoke(command, design_json, *asked), design_json)["reference"]) == {3.0}
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -449,6 +449,6 @@ def test_a_run_that_diverges_is_not_covered(delay_free_design: Design) -> None:
     lost = dataclasses.replace(runs["none"], control=np.full(2401, np.nan))
     found = verdicts(delay_free_design, exact, runs | {"corrected": lost}, 10.0, reference)
     assert set(found) == {"thesis"}
-    summary = tracking_summary(runs | {"corrected": lost}, found, 10.0, False, reference, 11.05, 4.0).set_index("run")
+    summary = tracking_summary(runs | {"corrected": lost}, found, 10.0, reference, 11.05, 4.0).set_index("run")
     assert summary.loc["corrected", ["guaranteed_sector", "needed_sector", "largest_control"]].isna().all()
     assert summary.loc["corrected", "covered"] == 0

@@ -7,8 +7,9 @@ import pandas as pd
 
 from data.thesis import printed_numbers
 from design.design_file import Design
-from experiments.runs.compare_anti_windups import loops, run_all, span, tracking_summary, tracking_table, verdicts
+from experiments.runs.compare_anti_windups import NAMES
 from experiments.thesis.printed_choices import thesis_reference
+from experiments.tracking import tracking_tables
 
 PERIODS = 6  # the thesis does not print its horizon
 SAMPLES_PER_PERIOD = 4000
@@ -30,17 +31,33 @@ def delay_free_tables(design: Design, limit: float | None = None) -> dict[str, p
         ``delay_free`` and ``delay_free_summary``, see :mod:`experiments.runs.compare_anti_windups`.
     """
     reference = thesis_reference("delay-free", design.reference_omegas)
-    limit_is_given = limit is not None
-    limit = printed_numbers()["delay_free"]["limit"] if limit is None else limit
-    horizon = PERIODS * span(design, reference)
-    time_s = np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1)
-    exact = loops(design, reference)
-    runs = run_all(exact, limit, time_s)
-    promised = verdicts(design, exact, runs, limit, reference)
-    required = reference.required(design.loop_plant).value
+    used = printed_numbers()["delay_free"]["limit"] if limit is None else limit
+    found = tracking_tables(design, reference, used, NAMES, periods=PERIODS, samples=SAMPLES_PER_PERIOD)
     return {
-        "delay_free": tracking_table(runs, reference),
-        "delay_free_summary": tracking_summary(
-            runs, promised, limit, limit_is_given, reference, required, horizon / PERIODS
-        ),
+        "delay_free": found["tracking"],
+        "delay_free_summary": as_thesis(found["tracking_summary"], found["tracking"], limit is not None),
     }
+
+
+def as_thesis(summary: pd.DataFrame, table: pd.DataFrame, limit_is_given: bool) -> pd.DataFrame:
+    """What the captions on the thesis's loops say of their runs.
+
+    Parameters
+    ----------
+    summary, table
+        See :func:`experiments.runs.compare_anti_windups.tracking_summary`, and the table that it sums up.
+    limit_is_given
+        Whether the user gave the limit; else it is the thesis's, printed or found.
+
+    Returns
+    -------
+    DataFrame
+        The columns of the summary up to ``covered`` without lower_limit; and limit_is_given (0 or 1) and
+        peak_error_after_1s (from one second on, as chapter 4 reads its plot; empty: the run is shorter).
+    """
+    after = table[table["time_s"] >= 1.0]
+    peaks = [float(np.abs(after[f"error_{run}"].to_numpy()).max()) if len(after) else np.nan for run in summary["run"]]
+    found = summary.loc[:, :"covered"].drop(columns="lower_limit")
+    found.insert(2, "limit_is_given", int(limit_is_given))
+    found.insert(list(found).index("ripple") + 1, "peak_error_after_1s", peaks)
+    return found

@@ -14,6 +14,7 @@ from experiments.runs.compare_anti_windups import loops, run_all, span, tracking
 from experiments.runs.design_loop import design_loop
 from experiments.runs.metrics import last_saturation
 from experiments.thesis.printed_choices import thesis_reference
+from experiments.thesis.studies.chapter_2 import as_thesis
 from identification.base.errors import InputError
 
 PERIODS = 5  # the thesis does not print its horizon
@@ -48,18 +49,13 @@ def extended_tables(design: Design, limit: float | None = None) -> dict[str, pd.
     required = reference.required(design.loop_plant).value
     horizon = PERIODS * span(design, reference)
     exact = loops(design, reference)
-    limit_is_given = limit is not None
-    if limit is None:
-        limit = usual_limit(design)
+    used = usual_limit(design) if limit is None else limit
     every = exact | {f"{name}_pade": with_pade(exact[name], PADE_ORDER) for name in ("none", "thesis")}
-    runs = run_all(every, limit, np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1))
-    promised = verdicts(design, exact, runs, limit, reference)
-    return {
-        "extended": tracking_table(runs, reference),
-        "extended_summary": tracking_summary(
-            runs, promised, limit, limit_is_given, reference, required, horizon / PERIODS
-        ),
-    }
+    runs = run_all(every, used, np.linspace(0.0, horizon, PERIODS * SAMPLES_PER_PERIOD + 1))
+    promised = verdicts(design, exact, runs, used, reference)
+    table = tracking_table(runs, reference)
+    summary = tracking_summary(runs, promised, used, reference, required, horizon / PERIODS)
+    return {"extended": table, "extended_summary": as_thesis(summary, table, limit is not None)}
 
 
 def usual_limit(design: Design) -> float:

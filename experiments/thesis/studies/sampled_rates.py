@@ -7,22 +7,19 @@ import math
 import numpy as np
 import pandas as pd
 
-from design.anti_windup.compensator import AntiWindup
 from design.blocks.block import fastest_root
 from design.design_file import Design
 from experiments.drive.difference_equations import METHODS
-from experiments.drive.sampled_loop import Drive, SampledRun, instants, simulate_sampled
+from experiments.drive.sampled_loop import Drive, instants, simulate_sampled
 from experiments.engine.simulate import DivergenceError
-from experiments.runs.compare_anti_windups import SETTLED, compensators, loops, run_all, span
-from experiments.runs.metrics import over_last, settling_time
-from experiments.runs.references import Reference
+from experiments.rates import numbers_of, rows_of, usual_rates
+from experiments.runs.compare_anti_windups import NAMES, loops, run_all, span
 from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies.chapter_4 import PERIODS, usual_limit
 from identification.base.errors import InputError
 
 # Our choices, in units of the design: the thesis has no computer and no drive.
-SAMPLES = (2, 4, 8, 16, 32, 64)  # in a period of the fastest root of the controller
-SHOWN = 16  # of them, whose run is kept over time
+SHOWN = 16  # samples in a period of the fastest root of the controller: the rate whose run is kept over time
 BITS = 12  # of the converter: 2^BITS levels from limit to limit
 SLEW_PERIODS = 2  # of that root, which the actuator takes from limit to limit
 LATE = 1  # samples from a sampling instant to the actuator's answer
@@ -64,60 +61,34 @@ def sampled_rates_tables(design: Design, limit: float | None = None) -> dict[str
     if not math.isfinite(limit):
         raise InputError(f"the limit is {limit:g}; expected a finite one, whose range a converter divides")
     root = fastest_root(*design.controller_parts())
-    rates = {n: n * root / (2 * math.pi) for n in SAMPLES}
+    shown = usual_rates(design)[SHOWN]
     facts = {
         "limit": limit,
         "quantum": 2 * limit / 2**BITS,
         "full_range_s": SLEW_PERIODS * 2 * math.pi / root,
         "root": root,
-        "shown_hz": rates[SHOWN],
+        "shown_hz": shown,
         "period_s": period,
     }
 
-    stride = max(1, round(rates[SHOWN] * period / ROWS_PER_PERIOD))
-    time_s = instants(rates[SHOWN], horizon)[::stride]
+    def drive(method: str, rate: float) -> Drive:
+        return Drive(rate, method, (-limit, limit), facts["quantum"], 2 * limit / facts["full_range_s"], LATE / rate)
+
+    stride = max(1, round(shown * period / ROWS_PER_PERIOD))
+    time_s = instants(shown, horizon)[::stride]
     columns = {"time_s": time_s}
-    rows = []
+    rows: list[dict[str, object]] = []
     for name, run in run_all(continuous, limit, time_s).items():
         columns[f"error_{name}"] = run.outputs["error"]
         rows.append({"run": name, "method": "continuous", "rate_hz": math.nan})
-        rows[-1] |= _numbers(time_s, run.outputs["error"], period, reference)
-    for name, kind in compensators(design).items():
-        for method in METHODS:
-            for samples, rate in rates.items():
-                drive = Drive(
-                    rate,
-                    method,
-                    (-limit, limit),
-                    quantum=facts["quantum"],
-                    rate_limit=2 * limit / facts["full_range_s"],
-                    input_delay_s=LATE / rate,
-                )
-                found = _run(design, reference, kind, drive, horizon)
-                rows.append({"run": name, "method": method, "rate_hz": rate})
-                if found is None:
-                    rows[-1] |= {"steady_error": math.nan, "settling_s": math.nan}
-                else:
-                    rows[-1] |= _numbers(found.time_s, found.error, period, reference)
-                if (samples, method) == (SHOWN, "tustin"):
-                    error = np.full(len(time_s), math.nan) if found is None else found.error[::stride]
-                    columns[f"error_{name}_drive"] = error
+        rows[-1] |= numbers_of(time_s, run.outputs["error"], period, reference)
+    drives = [drive(method, rate) for method in METHODS for rate in usual_rates(design).values()]
+    for name in NAMES:
+        rows += rows_of(design, reference, name, drives, horizon, period, "thesis")
+        try:
+            found = simulate_sampled(design, reference, name, drive("tustin", shown), horizon, form="thesis")
+        except DivergenceError:
+            columns[f"error_{name}_drive"] = np.full(len(time_s), math.nan)
+        else:
+            columns[f"error_{name}_drive"] = found.error[::stride]
     return {"sampled": pd.DataFrame(columns), "sampled_summary": pd.DataFrame(rows).assign(**facts)}
-
-
-def _run(
-    design: Design, reference: Reference, kind: AntiWindup | None, drive: Drive, horizon: float
-) -> SampledRun | None:
-    """A run, or None if it diverges."""
-    try:
-        return simulate_sampled(design, reference, kind, drive, horizon, form="thesis")
-    except DivergenceError:
-        return None
-
-
-def _numbers(time_s: np.ndarray, error: np.ndarray, period: float, reference: Reference) -> dict[str, float]:
-    offset, ripple = over_last(time_s, error, period)
-    return {
-        "steady_error": abs(offset) + ripple,
-        "settling_s": settling_time(time_s, error - offset, SETTLED * reference.amplitude),
-    }

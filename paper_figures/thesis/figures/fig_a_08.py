@@ -51,10 +51,11 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     return (
         "The anti-windups of others beside the thesis's and the corrected one (not in the thesis), in the same loop of "
         f"chapter 4 under the limits {of_limits(table)}. (a) From rest, and (b) after a disturbance of half their "
-        "distance at the plant's input, for a tenth of a period: how far the output is from that of the loop without "
-        "saturation, over the reference's amplitude; dotted, 1 %, which counts as recovered. (c), (d) The recovery time "
-        "and the greatest |u| over the larger limit; a full marker guarantees recovery whatever the control, a half one "
-        f"within a sector, an open one nothing. Recovery from rest and after the pulse: {said}.{physical}"
+        "distance at the plant's input, for a tenth of a period: how far the output is from that of the loop "
+        "without saturation, over the reference's amplitude; dotted, 1 %, which counts as recovered. (c), (d) The "
+        "recovery time and the greatest |u| over the larger limit; a full marker guarantees recovery whatever the "
+        "control, a half one within a sector, an open one nothing. Recovery from rest and after the pulse: "
+        f"{said}.{physical}"
     )
 
 

@@ -1,0 +1,79 @@
+"""The commands that run one design many times: ``tracking`` over its anti-windups, ``rates`` over a computer's rate."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import click
+
+from experiments.options import DESIGN, LIMIT_PAIR, OUTPUT_FOLDER, asked_limits, reference_options, sinusoid_options
+from experiments.pair_options import PairCommand
+from experiments.tables import write_into
+
+RATE_LIMIT = click.option(
+    "--rate-limit",
+    type=float,
+    default=math.inf,
+    help="Most change of the actuator in a second, in its unit, unknown to the controller.",
+)
+
+
+@click.command("tracking", cls=PairCommand)
+@DESIGN
+@LIMIT_PAIR
+@reference_options
+@RATE_LIMIT
+@OUTPUT_FOLDER
+def tracking_command(design: Path, limit: tuple[float, ...], rate_limit: float, output: Path, **reference: Any) -> None:
+    """Run DESIGN from rest with none, the corrected and every added anti-windup: tracking.csv, tracking_summary.csv."""
+    from design.design_file import read_design
+    from experiments.asked_reference import reference_of
+    from experiments.tracking import tracking_tables
+
+    limits, content = asked_limits(limit), read_design(design)
+    names, asked = ("none", "corrected", *content.added), reference_of(content, **reference)
+    write_into(output, tracking_tables(content, asked, limits, names, rate_limit=rate_limit))
+
+
+@click.command("rates", cls=PairCommand)
+@DESIGN
+@LIMIT_PAIR
+@sinusoid_options
+@RATE_LIMIT
+@click.option("--rate", type=float, help="Of the computer in Hz, beside those that suit the controller.")
+@click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels in its unit; 0, no levels.")
+@click.option("--input-delay", type=float, default=0.0, help="From sample to actuator in seconds.")
+@OUTPUT_FOLDER
+def rates_command(
+    design: Path,
+    limit: tuple[float, ...],
+    rate_limit: float,
+    rate: float | None,
+    quantum: float,
+    input_delay: float,
+    output: Path,
+    **reference: Any,
+) -> None:
+    """Run DESIGN's controller on a computer, at 2 to 64 samples in a period of its fastest root: rates.csv."""
+    from tqdm import tqdm
+
+    from design.design_file import read_design
+    from experiments.asked_reference import sinusoids
+    from experiments.rates import rates_tables
+
+    limits, content = asked_limits(limit), read_design(design, "extended")
+    asked = sinusoids(content, **reference)
+    with tqdm(desc="rates", unit=" runs", disable=None, leave=False) as bar:
+        tables = rates_tables(
+            content,
+            asked,
+            limits,
+            rate=rate,
+            quantum=quantum,
+            rate_limit=rate_limit,
+            input_delay_s=input_delay,
+            tick=bar.update,
+        )
+        write_into(output, tables)

@@ -1,0 +1,98 @@
+"""One design from rest under its user's reference and limits, without and with anti-windup, as two tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from design.design_file import Design
+from experiments.engine.simulate import limit_pair, simulate
+from experiments.runs.compare_anti_windups import loops, run_all, span, tracking_summary, tracking_table, verdicts
+from experiments.runs.references import Reference, SampledReference
+from experiments.runs.region import longest_run, require_within_region
+from experiments.runs.sector_promise import steady_control
+from experiments.runs.steady_control import steady_constant
+
+PERIODS = 5
+SAMPLES = 2000  # a period
+
+
+def tracking_tables(
+    design: Design,
+    reference: Reference | SampledReference,
+    limits: float | Sequence[float],
+    names: Sequence[str] = ("none", "corrected"),
+    *,
+    rate_limit: float = math.inf,
+    periods: int = PERIODS,
+    samples: int = SAMPLES,
+) -> dict[str, pd.DataFrame]:
+    """Run a design from rest with several anti-windups.
+
+    Parameters
+    ----------
+    design
+        Of either kind.
+    reference
+        r(t); one of sinusoids runs for ``periods`` of the slowest, a sampled one until its last time.
+    limits
+        Of the actuator, (lower, upper), or one number for +- that.
+    names
+        The anti-windups, see :meth:`design.design_file.Design.chosen`.
+    rate_limit
+        The most that the actuator's output changes in a second, in its unit; the controller does not know it.
+    periods, samples
+        Length of a run in periods, and its samples in each.
+
+    Returns
+    -------
+    dict
+        ``tracking`` and ``tracking_summary``, see :mod:`experiments.runs.compare_anti_windups`. To the summary are
+        added steady_least and steady_greatest, between which lies the control that follows the reference,
+        linear_control, the greatest \\|u\\| of the loop without limits, and span_s, the length of what is called the
+        last period.
+
+    Raises
+    ------
+    InputError
+        The limits are not in order, there is no anti-windup of a name, or the reference takes an unstable plant out of
+        the region in which the limits can hold it.
+    """
+    pair, plant = limit_pair(limits), design.loop_plant
+    require_within_region(plant, reference, pair)
+    until, span_s = _length(design, reference, periods)
+    until = min(until, longest_run(plant))
+    time_s = np.linspace(0.0, until, max(round(until / span_s * samples), 2) + 1)
+    every = loops(design, reference, names)
+    runs = run_all(every, pair, time_s, rate_limit)
+    linear = simulate(next(iter(every.values())), (-math.inf, math.inf), time_s)
+    promised = verdicts(design, every, runs, pair, reference)
+    steady = steady_control(reference, plant, time_s)
+    summary = tracking_summary(runs, promised, pair, reference, _required(design, reference), span_s)
+    return {
+        "tracking": tracking_table(runs, reference),
+        "tracking_summary": summary.assign(
+            steady_least=float(steady.min()),
+            steady_greatest=float(steady.max()),
+            linear_control=float(np.abs(linear.control).max()),
+            span_s=span_s,
+        ),
+    }
+
+
+def _length(design: Design, reference: Reference | SampledReference, periods: int) -> tuple[float, float]:
+    """How long a run lasts, and how long its last period, in seconds."""
+    if isinstance(reference, SampledReference):
+        return float(reference.time_s[-1]), float(reference.time_s[-1]) / periods
+    span_s = span(design, reference)
+    return periods * span_s, span_s
+
+
+def _required(design: Design, reference: Reference | SampledReference) -> float:
+    """The most that the control which follows the reference reaches; of samples, that of their end."""
+    if isinstance(reference, SampledReference):
+        return abs(steady_constant(design.loop_plant, float(reference.values[-1]), 0.0))
+    return reference.required(design.loop_plant).value

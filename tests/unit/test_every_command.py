@@ -1,0 +1,59 @@
+"""What holds of every command: -h, --version, defaults in its help, and one name for one thing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.metadata import version
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from antiwindup.__main__ import main
+
+SAME = {"--force", "--output", "--build", "--plants", "--seed", "--limit"}
+"""Options of one name whose types may differ: a builder's and a room's, a file or a folder, one pair or several."""
+
+
+def every_command(group: click.Group, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], click.Command]]:
+    context = click.Context(group)
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        assert command is not None
+        if isinstance(command, click.Group):
+            yield from every_command(command, (*words, name))
+        else:
+            yield (*words, name), command
+
+
+COMMANDS = dict(every_command(main))
+
+
+@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
+def test_its_help_shows_every_default(words: tuple[str, ...]) -> None:
+    """A default that the help does not show is one that enters silently."""
+    shown = CliRunner().invoke(main, [*words, "-h"])
+    assert shown.exit_code == 0
+    text = " ".join(shown.output.split())
+    for option in (each for each in COMMANDS[words].params if isinstance(each, click.Option)):
+        assert option.help, option.name
+        default = option.to_info_dict()["default"]
+        if isinstance(default, str | int | float) and not isinstance(default, bool) and default != "":
+            assert f"[default: {default}" in text or f"default: {default}]" in text, option.name
+
+
+@pytest.mark.parametrize("group", [(), ("identification",), ("design",), ("experiments", "thesis"), ("paper_figures",)])
+def test_every_group_says_its_version(group: tuple[str, ...]) -> None:
+    assert CliRunner().invoke(main, [*group, "--version"]).output.endswith(f"version {version('antiwindup-thesis')}\n")
+
+
+def test_an_option_is_the_same_in_every_command() -> None:
+    found: dict[str, set[tuple[str, bool, int]]] = {}
+    for command in COMMANDS.values():
+        for option in (each for each in command.params if isinstance(each, click.Option)):
+            kind = (option.type.name, option.multiple, option.nargs)
+            for name in option.opts:
+                found.setdefault(name, set()).add(kind)
+    several = {name: kinds for name, kinds in found.items() if len(kinds) > 1 and name not in SAME}
+    assert not several
+    assert not {"--period", "--slew"} & set(found)
