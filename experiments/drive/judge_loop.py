@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from design.blocks.block import Block, plant_block
 from design.design_file import Design
 from experiments.drive.difference_equations import SampledBlock
 from experiments.drive.held_plant import held_plant, image
-from experiments.drive.sampled_loop import FORMS, METHODS, Drive, controller_blocks
+from experiments.drive.sampled_loop import FORMS, Drive, controller_blocks
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
@@ -22,8 +22,7 @@ AROUND = np.concatenate([[0.0], np.geomspace(1e-2, 1e2, 41)])  # a root, in dist
 TURN = 0.5  # radians: between neighbouring frequencies the characteristic function turns by less
 FINEST = 40  # halvings of an interval of frequencies
 UNFOLLOWED = 1e-6  # % of the amplitude: smaller steady errors are alike
-RATES = 16  # a decade, of a search
-SPAN = 1e2  # of the rates of a search, to the reference's highest frequency or the loop's fastest root
+AT_REST = 1e-9  # radians: a constant, next to the integrators' poles
 
 
 @dataclass(frozen=True)
@@ -38,9 +37,9 @@ class LoopJudgement:
         Why the controller cannot run so; empty where it can.
     stable
         Whether every closed-loop pole is inside the unit circle.
-    omegas, steady_errors
-        The reference's frequencies in rad/s, and the error that stays at the samples in % of the amplitude of each,
-        which the continuous design does not have; not a number where the loop is not stable.
+    omegas, steady_errors, continuous_errors
+        The reference's frequencies in rad/s, the error that stays at the samples in % of the amplitude of each, not a
+        number where the loop is not stable, and that of the continuous loop.
     modulus_margin
         The least |1 + L| on the unit circle: the distance of the loop's frequency response from -1; 0 where it is not
         stable.
@@ -52,6 +51,7 @@ class LoopJudgement:
     stable: bool
     omegas: tuple[float, ...]
     steady_errors: tuple[float, ...]
+    continuous_errors: tuple[float, ...]
     modulus_margin: float
 
     @property
@@ -60,37 +60,15 @@ class LoopJudgement:
         return max(self.steady_errors) if self.stable else math.inf
 
     def __str__(self) -> str:
-        """A clause about the loop: at which rate, with which method, and what it does."""
-        at = f"at {self.rate_hz:g} Hz with the method {self.method} the linear loop"
+        """What the loop does, a clause without its subject."""
         if self.refused:
-            return f"{at} cannot run: {self.refused}"
+            return f"cannot run ({self.refused})"
         if not self.stable:
-            return f"{at} is UNSTABLE"
-        error = "no steady error" if self.steady_error < UNFOLLOWED else f"a steady error of {self.steady_error:.2g} %"
-        return f"{at} is stable, with {error} at the samples and a modulus margin of {self.modulus_margin:.2g}"
-
-
-@dataclass(frozen=True)
-class LeastRate:
-    """The rates at which the loop is stable, of a search.
-
-    Parameters
-    ----------
-    method
-        How the controller is discretised.
-    searched_hz
-        The lowest and the highest rate that were tried.
-    unstable_hz
-        The highest rate found at which the loop is not stable, or the controller cannot run; 0 where none was found.
-    stable_hz
-        The lowest rate that was tried above it: from there on every rate that was tried is stable. Infinite where none
-        was.
-    """
-
-    method: str
-    searched_hz: tuple[float, float]
-    unstable_hz: float
-    stable_hz: float
+            return "UNSTABLE"
+        error, beside = _percent(self.steady_error), max(self.continuous_errors)
+        if beside >= UNFOLLOWED:
+            error += f" (in continuous time {_percent(beside)})"
+        return f"stable, its steady error at the samples {error} and its modulus margin {self.modulus_margin:.2g}"
 
 
 def judge_loop(
@@ -128,58 +106,22 @@ def judge_loop(
     try:
         loop = _Loop(design, drive, true, form)
     except InputError as error:
-        unknown = (math.nan,) * len(frequencies)
-        return LoopJudgement(drive.method, drive.rate_hz, str(error), False, frequencies, unknown, 0.0)
-    stable, margin = loop.stability()
-    errors = tuple(100 * abs(loop.sensitivity(omega / drive.rate_hz)) if stable else math.nan for omega in frequencies)
-    return LoopJudgement(drive.method, drive.rate_hz, "", stable, frequencies, errors, margin)
+        refused, stable, margin = str(error), False, 0.0
+    else:
+        refused, (stable, margin) = "", loop.stability()
+    sampled = tuple(100 * abs(loop.sensitivity(omega / drive.rate_hz)) if stable else math.nan for omega in frequencies)
+    forward, feedback = design.controller_parts()
+    late = Block(1.0, (), (), design.loop_plant.delay_s)
+    rest = 1 - (feedback * late)(1j * np.array(frequencies))
+    around = forward * plant_block(true) * Block(1.0, (), (), drive.input_delay_s)
+    with np.errstate(invalid="ignore"):  # an integrator against a constant
+        continuous = 100 * np.abs(rest / (rest + around(1j * np.array(frequencies))))
+    left = tuple(0.0 if math.isnan(error) else float(error) for error in continuous)
+    return LoopJudgement(drive.method, drive.rate_hz, refused, stable, frequencies, sampled, left, margin)
 
 
-def judge_methods(
-    design: Design,
-    drive: Drive,
-    plant: PlantModel | None = None,
-    omegas: Sequence[float] | None = None,
-    form: str = FORMS[0],
-) -> list[LoopJudgement]:
-    """:func:`judge_loop` with every method, the best first: stable, then of least steady error, then of most margin."""
-    found = [judge_loop(design, replace(drive, method=method), plant, omegas, form) for method in METHODS]
-    return sorted(found, key=lambda each: (max(each.steady_error, UNFOLLOWED), -each.modulus_margin))
-
-
-def least_rate(design: Design, drive: Drive, plant: PlantModel | None = None, form: str = FORMS[0]) -> LeastRate:
-    """The highest rate found at which the loop is not stable: stability need not come and go once as the rate grows.
-
-    Parameters
-    ----------
-    design, drive, plant, form
-        As of :func:`judge_loop`; the drive's rate does not matter.
-
-    Notes
-    -----
-    RATES rates a decade are tried from the highest down, to above twice the reference's highest frequency, and the
-    step around the first unstable one is refined to 0.1 %. What lies between neighbouring rates above it was not tried.
-    """
-    fastest = max(design.reference_omegas) / (2 * math.pi)
-    roots = [abs(root) for block in design.controller_parts() for root in block.zeros + block.poles]
-    low, high = 2.1 * fastest, SPAN * max([fastest, *roots]) / (2 * math.pi)
-    low = low or high / SPAN**2
-
-    def stable(rate: float) -> bool:
-        return judge_loop(design, replace(drive, rate_hz=rate), plant, form=form).stable
-
-    rates = np.geomspace(high, low, int(RATES * math.log10(high / low)) + 2)
-    above = math.inf
-    for rate in map(float, rates):
-        if stable(rate):
-            above = rate
-            continue
-        below = rate
-        while math.isfinite(above) and above > 1.001 * below:
-            middle = math.sqrt(above * below)
-            above, below = (middle, below) if stable(middle) else (above, middle)
-        return LeastRate(drive.method, (low, high), below, above)
-    return LeastRate(drive.method, (low, high), 0.0, above)
+def _percent(error: float) -> str:
+    return "0" if error < UNFOLLOWED else f"{error:.2g} % of the amplitude"
 
 
 class _Loop:
@@ -208,7 +150,7 @@ class _Loop:
 
     def sensitivity(self, theta: float) -> complex:
         """1/(1 + L) at an angle."""
-        f, rest = self.parts(np.array([theta]))
+        f, rest = self.parts(np.array([max(theta, AT_REST)]))
         return complex(rest[0] / f[0])
 
     def stability(self) -> tuple[bool, float]:
@@ -229,7 +171,9 @@ class _Loop:
         if not np.isfinite(f).all():
             return False, 0.0
         turned = float(np.angle(f[1:] / f[:-1]).sum()) + float(np.angle(f[0] * np.sign(f[0].real)))
-        return abs(turned) < math.pi / 2, float(np.min(np.abs(f / rest))) if abs(turned) < math.pi / 2 else 0.0
+        if abs(turned) > math.pi / 2:
+            return False, 0.0
+        return True, float(1 / np.max(np.abs(rest / f)))
 
     def _angles(self) -> Real:
         """From far below every root to pi, denser around the roots of the blocks."""
@@ -237,7 +181,9 @@ class _Loop:
         place, distance = np.abs(np.angle(roots)), np.abs(np.log(np.abs(roots)))
         apart = np.abs(np.log(roots))
         lowest = 1e-3 * min([1.0, *apart[apart > 1e-12]])
-        near = np.concatenate([place[:, None] - distance[:, None] * AROUND, place[:, None] + distance[:, None] * AROUND])
+        near = np.concatenate(
+            [place[:, None] - distance[:, None] * AROUND, place[:, None] + distance[:, None] * AROUND]
+        )
         grid = np.geomspace(lowest, math.pi, int(A_DECADE * math.log10(math.pi / lowest)) + 2)
         every = np.concatenate([grid, near.ravel()])
         return np.unique(every[(every >= lowest) & (every <= math.pi)])

@@ -44,8 +44,8 @@ def matched_controller(
     Returns
     -------
     forward, feedback, theta
-        As of :class:`experiments.export.controller.SampledController`; none takes its input at once but ``forward`` and
-        the first output of ``theta``.
+        From e to v, from v to what is added to v, and from u_tilde to what u gives up and to y_d; none takes its input
+        at once but ``forward`` and the first output of ``theta``.
 
     Raises
     ------
@@ -55,14 +55,14 @@ def matched_controller(
 
     Notes
     -----
-    Everything is a function of w = (z - 1)/T, which tends to s. With P_d z^-N the held plant, the poles and zeros of
-    K = T_so/P_o move to exp(s T), so that K_d cancels the poles of P_d exactly, and half a sample each is given to the
-    poles that K has more than zeros, as Tustin's rule does. Then T_d = K_d P_d z^-N, by construction and not by a rule
-    for T_so T_si, so that the loop around the design's plant is y = T_d r, stable at every rate. The numerator n_d of
-    T_so is corrected by a polynomial of as many coefficients as there are tracking conditions, until T_d = 1 at the
-    samples of every sinusoid of the reference, at z = 1 as often as the continuous T, and at the plant's unstable
-    poles. 1 + theta1~ goes by Tustin's rule, which keeps where it is positive real, and theta2 = P_d (1 + theta1~) is
-    exact: y + y_d is the linear loop's response at the samples.
+    Everything is a function of w = (z - 1)/T, which tends to s. P_d z^-N is the held plant. The poles of T_so and of
+    P_o move to exp(s T), so that K_d cancels the poles of P_d exactly, see :func:`_inverted` for its zeros, and K_d has
+    as many zeros at z = -1 as K has poles more than zeros, as by Tustin's rule. T_d = K_d P_d z^-N is made of the held
+    plant itself, so that the loop around the design's plant is y = T_d r, whose poles are inside the unit circle at
+    every rate. The numerator of T_so is corrected by a polynomial of as many coefficients as there are tracking
+    conditions, so that T_d = 1 at the samples of every sinusoid of the reference, at z = 1 as often as the continuous
+    T, and at the plant's unstable poles. 1 + theta1~ goes by Tustin's rule, which keeps where it is positive real, and
+    theta2 = P_d (1 + theta1~) is exact: y + y_d is the linear loop's response at the samples.
     """
     T, parameters, fastest = sample_time_s, design.parameters, max(design.reference_omegas)
     if not isinstance(parameters, ExtendedParameters) or parameters.inverse_epsilon:
@@ -85,7 +85,7 @@ def matched_controller(
         forward, feedback = _coprime(design.plant, K_d, T_d, parameters.a, samples, T)
     theta = realize(Block(0.0), Block(0.0))
     if anti_windup is not None:
-        one_plus = _by_tustin(anti_windup.one_plus, design.plant.unstable_poles, T)
+        one_plus = _by_tustin(anti_windup.one_plus, plant_block(design.plant).unstable_poles, T)
         both = realize(one_plus, one_plus * P_d)
         theta = StateSpace(both.A, both.b, both.C, both.d - [1.0, 0.0])
     return _sampled(realize(forward), [0], T), feedback, _sampled(theta, [0, samples], T)
@@ -99,7 +99,7 @@ def _forward(design: Design, P_d: Block, samples: int, T: float) -> Block:
     at_zero = (0j,) * wanted.zeros_at_zero
     half = Block((T / 2) ** design.blocks["K"].relative_degree, (-2 / T,) * design.blocks["K"].relative_degree)
     fixed = Block(1.0, at_zero, _images(T_so.poles, T))
-    fixed = fixed * Block(1 / P_o.gain, _images(P_o.poles, T), _images(P_o.zeros, T)) * half
+    fixed = fixed * Block(1 / P_o.gain, _images(P_o.poles, T), _inverted(design.plant, P_d, T)) * half
     n = Block(T_so.gain, _images([zero for zero in T_so.zeros if zero], T))
     T_d = fixed * P_d
 
@@ -117,6 +117,28 @@ def _forward(design: Design, P_d: Block, samples: int, T: float) -> Block:
     )
     corrected = own + arb_poly(more)
     return factored(corrected.coeffs(), unit) * fixed
+
+
+def _inverted(plant: PlantModel, P_d: Block, T: float) -> tuple[complex, ...]:
+    """The poles of K_d in the place of the plant's zeros: the zeros of P_d next to them, or their mirror images.
+
+    They are inside the unit circle at least as far as the images of the plant's zeros are from it, so that |T_d| has
+    no peak there. The zeros that sampling adds to P_d are not inverted.
+    """
+    found, spare = [], [zero for zero in P_d.zeros if zero.imag or T * zero.real > -1]
+    for zero in plant_block(plant).zeros:
+        near = [each for each in spare if np.sign(each.imag) == np.sign(zero.imag)]
+        if abs(zero.imag) * T >= np.pi:  # the computer does not see it
+            found.append(complex(-1 / T))
+        elif not (zero and near):
+            found.append(image(complex(-abs(zero.real), zero.imag), T))
+        else:
+            chosen = min(near, key=lambda each: abs(each - image(zero, T)))
+            spare.remove(chosen)
+            s = np.log1p(T * chosen) / T
+            decay = max(abs(s.real), abs(zero.real))
+            found.append(chosen if s.real == -decay else image(complex(-decay, s.imag), T))
+    return tuple(found)
 
 
 def _coprime(plant: PlantModel, K_d: Block, T_d: Block, a: float, samples: int, T: float) -> tuple[Block, SampledBlock]:
@@ -145,14 +167,16 @@ def _images(roots: Sequence[complex], T: float) -> tuple[complex, ...]:
 
 def _by_tustin(block: Block, kept: tuple[complex, ...], T: float) -> Block:
     """A block of as many zeros as poles by Tustin's rule, in w; a zero among ``kept`` moves to exp(s T) instead."""
-    gain, moved = complex(block.gain), []
-    for roots, power in ((block.zeros, 1), (block.poles, -1)):
-        factors = [1.0 if power > 0 and root in kept else 1 - root * T / 2 for root in roots]
-        if min(np.abs(factors), default=1.0) < 1e-12:
-            raise InputError(f"theta1~ has a root at {2 / T:.6g} rad/s, twice the rate; expected another rate")
-        gain *= np.prod(factors) ** power
-        moved.append([image(r, T) if power > 0 and r in kept else r / f for r, f in zip(roots, factors, strict=True)])
-    return Block(gain.real, *map(tuple, moved))
+    zeros = [1.0 if zero in kept else 1 - zero * T / 2 for zero in block.zeros]
+    poles = [1 - pole * T / 2 for pole in block.poles]
+    if min(np.abs([*zeros, *poles]), default=1.0) < 1e-12:
+        raise InputError(f"theta1~ has a root at {2 / T:.6g} rad/s, twice the rate; expected another rate")
+    moved = zip(block.zeros, zeros, strict=True)
+    return Block(
+        block.gain * float(np.real(np.prod(zeros) / np.prod(poles))),
+        tuple(image(zero, T) if zero in kept else zero / factor for zero, factor in moved),
+        tuple(pole / factor for pole, factor in zip(block.poles, poles, strict=True)),
+    )
 
 
 def _sampled(system: StateSpace, first: Sequence[int], T: float) -> SampledBlock:

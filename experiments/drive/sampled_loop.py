@@ -41,7 +41,8 @@ class Drive:
     rate_hz
         1/T_s, samples a second.
     method
-        How each block of the controller is discretised, ``tustin`` or ``exact``, see
+        How the controller is discretised: ``matched``, made again for the plant with a held input, see
+        :func:`experiments.drive.matched_controller.matched_controller`, or block by block, ``tustin`` or ``exact``, see
         :func:`experiments.drive.difference_equations.sample_block`.
     limits
         (sigma_1, sigma_2) of the saturation, sigma_1 < sigma_2, either may be infinite; one number is +- that.
@@ -70,7 +71,7 @@ class Drive:
         if not 0 < self.rate_hz < math.inf:
             raise InputError(f"the rate is {self.rate_hz:g} Hz; expected a positive number")
         if self.method not in METHODS:
-            raise InputError(f"the method is '{self.method}'; expected {' or '.join(METHODS)}")
+            raise InputError(f"the method is '{self.method}'; expected {', '.join(METHODS[:-1])} or {METHODS[-1]}")
         if not 0 <= self.quantum < math.inf:
             raise InputError(f"the quantum is {self.quantum:g}; expected a number that is not negative, 0 for none")
         if not self.rate_limit > 0:
@@ -242,27 +243,35 @@ def controller_blocks(
     """What makes v of e, and of v; theta1~, and theta2 behind its dead time; what v takes of itself at once."""
     if form not in FORMS:
         raise InputError(f"the form is '{form}'; expected {' or '.join(FORMS)}")
+    if drive.method == "matched":
+        forward, feedback, theta = matched_controller(design, anti_windup, 1 / drive.rate_hz, form)
+    else:
+        forward, feedback, theta = _by_rule(design, anti_windup, drive, form)
+    around = float(feedback.at_once.sum())
+    if not (around < 1 and 1 + theta.d[0] + forward.d[0] * theta.at_once[1] / (1 - around) > 0):
+        raise InputError(
+            f"at {drive.rate_hz:g} Hz the method {drive.method} leaves the controller an algebraic loop without one "
+            "solution; expected a higher rate, or another method"
+        )
+    return forward, feedback, theta, around
+
+
+def _by_rule(
+    design: Design, anti_windup: AntiWindup | None, drive: Drive, form: str
+) -> tuple[SampledBlock, SampledBlock, SampledBlock]:
+    """The blocks of :func:`controller_blocks`, each discretised by itself."""
     delay_s, T = design.loop_plant.delay_s, 1 / drive.rate_hz
     first, second = design.controller_parts()
     compensator = (Block(0.0), Block(0.0))
     if anti_windup is not None:
         compensator = (anti_windup.theta1_tilde, anti_windup.theta2(design.loop_plant))
-    if drive.method == "matched":
-        return *matched_controller(design, anti_windup, T, form), 0.0
     if form == "thesis":
         feedback = sample_block(realize(second), [delay_s], T, drive.method)
     else:
         factors = realised(design)
         first, feedback = factors.forward, sample_memory(factors, T, drive.method)
     forward = sample_block(realize(first), [0.0], T, drive.method)
-    theta = sample_block(realize(*compensator), [0.0, delay_s], T, drive.method)
-    around = float(feedback.at_once.sum())
-    if not (around < 1 and 1 + theta.d[0] + forward.d[0] * theta.at_once[1] / (1 - around) > 0):
-        raise InputError(
-            f"at {drive.rate_hz:g} Hz Tustin's rule leaves the controller an algebraic loop without one solution; "
-            "expected a higher rate, or the method exact"
-        )
-    return forward, feedback, theta, around
+    return forward, feedback, sample_block(realize(*compensator), [0.0, delay_s], T, drive.method)
 
 
 def _actuator(drive: Drive, command: np.ndarray, start: np.ndarray) -> np.ndarray:
