@@ -11,7 +11,7 @@ from importlib import import_module
 
 import click
 
-from identification.base.command_line import CommandGroup, with_force
+from identification.base.command_line import CommandGroup
 
 COMMANDS = {"new": "new_command"} | dict.fromkeys(("refit", "figures", "report"), "commands")
 COMMANDS |= {name: f"{name}_command" for name in ("export", "check", "explore")}
@@ -29,7 +29,7 @@ class Rooms(CommandGroup):
         if cmd_name in ROOMS:
             found: click.Command = import_module(f"{cmd_name}.__main__").main
         elif cmd_name in COMMANDS:
-            found = with_force(getattr(import_module(f"antiwindup.{COMMANDS[cmd_name]}"), cmd_name))
+            found = getattr(import_module(f"antiwindup.{COMMANDS[cmd_name]}"), cmd_name)
             self.add_command(found)  # with --force where it writes
         else:
             return None
