@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 from design.design_file import Design
 from experiments.runs.compare_anti_windups import SETTLED
@@ -24,6 +24,7 @@ TABLES: tuple[str, ...] = ("compare", "compare_runs")
 UPSETS = {"start": ("a", "c"), "pulse": ("b", "d")}
 SHOWN = 0.5  # of the time that an upset counts
 FLOOR = 1e-3  # of the amplitude
+FEW = 10  # times the least control is the greatest, below which powers of ten are too few ticks
 DOT: dict[str, Any] = {"marker": "o", "markersize": 5.0, "linestyle": "none"}
 FILLED = {"global": "full", "none": "none"}  # of a marker; half for a sector
 
@@ -111,6 +112,10 @@ def _measures(panel: Axes, table: pd.DataFrame, words: Mapping[str, str]) -> Non
         _say(panel, "every run recovers at once" if (table["recovery_s"] == 0).any() else "no run recovers")
     panel.set(xscale="log")
     panel.xaxis.set_minor_formatter(NullFormatter())
+    low, high = panel.get_xlim()
+    if high < FEW * low:
+        panel.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     panel.set(xlabel=r"Greatest $|u|$ / limit", ylabel="Recovery time [s]", ylim=(0, None))
 
 

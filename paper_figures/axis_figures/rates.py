@@ -22,9 +22,9 @@ TABLES: tuple[str, ...] = ("rates",)
 
 RUNS = ("corrected", "none")  # the thin lines upon the broad ones
 CONTINUOUS = "continuous"
-METHODS = {"tustin": ("Tustin's rule", "o"), "exact": ("held inputs", "s")}
+METHODS = {"matched": ("matched", "^"), "tustin": ("Tustin's rule", "o"), "exact": ("held inputs", "s")}
 MARKER = 3.5
-DECADES = 6
+LEAST = 1e-6  # of the amplitude: an error that is less is drawn as this
 DIVERGENT = 100.0  # times the reference's amplitude is not shown
 
 
@@ -37,9 +37,10 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
     steps = f" in steps of {with_unit(levels, signals.input_unit)}" if levels else ""
     return (
         f"The controller on a computer, under the limits {limits_said(table, signals.input_unit)}{steps}: the greatest "
-        "error of the last period over the sampling rate, its blocks discretised by Tustin's rule (circles) or as they "
-        f"answer an input that is held for a sample (squares); broad, in continuous time; dotted, {band}, which is 1 % "
-        "of the reference's amplitude. With the corrected anti-windup the error comes to stay within as much of that "
+        "error of the last period over the sampling rate. The controller is made again for samples ('matched', "
+        "triangles), or its blocks are discretised by Tustin's rule (circles) or as they answer an input that is held "
+        f"for a sample (squares); broad, in continuous time; dotted, {band}, which is 1 % "
+        "of the reference's amplitude; less than a millionth of it is drawn as that. With the corrected anti-windup the error comes to stay within as much of that "
         f"in continuous time by {said}.{_divergent(table)}"
     )
 
@@ -61,7 +62,8 @@ def _divergent(table: pd.DataFrame) -> str:
 @styled()
 def draw(design: Design, tables: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the figure."""
-    table = tables["rates"]
+    least = LEAST * only(tables["rates"], "amplitude")
+    table = tables["rates"].assign(steady_error=tables["rates"]["steady_error"].clip(lower=least))
     panel = figure(FULL_WIDTH, 3.2).subplots()
     over_rate(panel, table, RUNS)
     for run in RUNS:
@@ -75,8 +77,8 @@ def draw(design: Design, tables: Mapping[str, pd.DataFrame]) -> Figure:
     known = known[(known > 0) & (known < DIVERGENT * only(table, "amplitude"))]
     if len(known):
         top = 2 * max(float(known.max()), SETTLED * only(table, "amplitude"))
-        panel.set_ylim(max(float(known.min()) / 2, top / 10**DECADES), top)
-    panel.legend(**panels.ABOVE, ncols=len(panel.get_legend_handles_labels()[1]))
+        panel.set_ylim(float(known.min()) / 2, top)
+    panel.legend(**panels.ABOVE, ncols=3)
     found = panel.get_figure(root=True)
     assert found is not None
     return found
@@ -90,22 +92,23 @@ def over_rate(panel: Axes, table: pd.DataFrame, runs: Sequence[str]) -> None:
     panel
         Where to draw.
     table
-        With the columns run, method (continuous, tustin, exact), rate_hz and steady_error.
+        With the columns run, method (continuous, matched, tustin, exact), rate_hz and steady_error.
     runs
         Those that are drawn, the last one upon the others.
     """
     ends = (table["rate_hz"].min(), table["rate_hz"].max())
+    known = {method: look for method, look in METHODS.items() if method in set(table["method"])}
     for order, run in enumerate(runs):
         line = LINES[look_of(run)]
         own = table[table["run"] == run]
         panel.plot(ends, [float(own["steady_error"][own["method"] == CONTINUOUS].iloc[0])] * 2, **panels.band(line))
-        for method, (_, marker) in METHODS.items():
+        for method, (_, marker) in known.items():
             rows = own[own["method"] == method]
-            face = line["color"] if method == "tustin" else "#FFFFFF"
+            face = "#FFFFFF" if method == "exact" else line["color"]
             look = line | {"marker": marker, "markersize": MARKER, "markerfacecolor": face, "zorder": 3 + order}
             panel.plot(rows["rate_hz"], rows["steady_error"], **look)
-    for method, (label, marker) in METHODS.items():
-        face = "#000000" if method == "tustin" else "#FFFFFF"
+    for method, (label, marker) in known.items():
+        face = "#FFFFFF" if method == "exact" else "#000000"
         look = {"color": "#000000", "linestyle": "none", "marker": marker, "markersize": MARKER}
         panel.plot([], [], **look, markerfacecolor=face, label=label)
     panel.set(xscale="log", xlabel="Sampling rate [Hz]", yscale="log")

@@ -18,7 +18,8 @@ from paper_figures.look.captions import duration, hertz, limits_said, number, of
 from paper_figures.summary.build_folder import DESIGNS, TABLES, Found
 from paper_figures.summary.of_fit import Paragraph, cautions
 
-METHODS = {"tustin": "Tustin's rule", "exact": "held-input discretisation"}
+NONE = 1e-6  # of the amplitude: a smaller error is no more than rounding
+METHODS = {"matched": "the method 'matched'", "tustin": "Tustin's rule", "exact": "held-input discretisation"}
 FOLLOWS = {
     "tracking": "the run under the reference",
     "compare": "the comparison of anti-windups",
@@ -174,8 +175,8 @@ def _discretise(rates: pd.DataFrame, run: str, signals: Signals) -> Iterator[str
         "more than 1 % of the reference's amplitude above that in continuous time, at every rate that was tried."
     )
     if not math.isnan(asked):
-        said = " and ".join(
-            f"{_left(error, signals)} by {METHODS[each]}"
+        said = ", ".join(
+            f"{_left(error, only(rates, 'amplitude'), signals)} by {METHODS[each]}"
             for each, error in ((each, _error(rates, run, each, asked)) for each in METHODS)
         )
         yield f"At your rate of {hertz(asked)} the steady error is {said}."
@@ -189,10 +190,11 @@ def _avoid(rates: pd.DataFrame, run: str, signals: Signals) -> Iterator[str]:
         below = rows if math.isnan(lowest) else rows[rows["rate_hz"] < lowest]
         if len(below):
             last = below.iloc[-1]
-            left = _left(float(last["steady_error"]), signals)
+            left = _left(float(last["steady_error"]), float(last["amplitude"]), signals)
+            left = f"the steady error is {left}" if last["stable"] else "the loop is unstable"
             tried = hertz(last["rate_hz"])
             until = f"at any rate up to {tried}" if math.isnan(lowest) else f"below {hertz(lowest)}"
-            yield f"Do not use {words} {until}: at {tried} the steady error is {left}."
+            yield f"Do not use {words} {until}: at {tried} {left}."
 
 
 def _error(rates: pd.DataFrame, run: str, method: str, rate_hz: float) -> float:
@@ -200,7 +202,9 @@ def _error(rates: pd.DataFrame, run: str, method: str, rate_hz: float) -> float:
     return float(rows["steady_error"].iloc[int((rows["rate_hz"] - rate_hz).abs().to_numpy().argmin())])
 
 
-def _left(error: float, signals: Signals) -> str:
+def _left(error: float, amplitude: float, signals: Signals) -> str:
+    if error < NONE * amplitude:
+        return "less than a millionth of the amplitude"
     return "unbounded" if math.isnan(error) else with_unit(error, signals.output_unit)
 
 

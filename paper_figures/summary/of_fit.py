@@ -242,8 +242,8 @@ def _bound(bound: AdditiveBound, report: BoundReport) -> str:
         for touch in report.touches[:MOST_TOUCHES]
     ]
     return (
-        f"W_a bounds how far the plant may be from the model: {bound_text(bound)}, at no line below the distance of a test from the model, nor between the "
-        "lines, as far as was looked, below that of its own fit, "
+        f"W_a bounds how far the plant may be from the model: {bound_text(bound)}, at no line below the distance of a "
+        "test from the model, nor between the lines, as far as was looked, below that of its own fit, "
         f"{number(report.mean_excess)} times their envelope on average and "
         f"{number(report.largest_excess)} times at most (no bound of this order gets below "
         f"{lower_end(report.least_excess, 3)})."

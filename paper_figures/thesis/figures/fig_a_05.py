@@ -32,7 +32,7 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     levels = round(2 * only(summary, "limit") / quantum)
     tustin, held = (
         " and ".join(_size(_of(summary, "corrected", method, rate, "steady_error")) for rate in rates[[0, -1]])
-        for method in METHODS
+        for method in ("tustin", "exact")
     )
     shown, slowest, fastest = (sampling_rate(hertz) for hertz in (only(summary, "shown_hz"), *rates[[0, -1]]))
     lasting = _size(_of(summary, "thesis", CONTINUOUS, math.nan, "steady_error"))
