@@ -10,6 +10,7 @@ import click
 
 from experiments.options import DESIGN, LIMIT_PAIR, asked_limits
 from experiments.pair_options import PairCommand
+from identification.base.axis_option import AXIS
 from identification.base.errors import InputError
 from identification.base.path_types import OUTPUT_FOLDER
 
@@ -19,6 +20,7 @@ WRITERS = {"c": "c_code", "json": "json_file", "fmu": "fmu"}
 
 @click.command("export", cls=PairCommand)
 @DESIGN
+@AXIS
 @click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
 @click.option("--to", type=click.Choice(list(WRITERS)), required=True, help="What is written.")
 @LIMIT_PAIR
