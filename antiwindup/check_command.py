@@ -9,11 +9,9 @@ from typing import Any
 import click
 
 from identification.__main__ import reading_options
-from identification.base.command_line import with_force
 from identification.base.path_types import INPUT, INPUT_FILE, OUTPUT_FILE
 
 
-@with_force
 @click.command("check")
 @click.argument("model")
 @click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)

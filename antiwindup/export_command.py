@@ -10,15 +10,13 @@ import click
 
 from experiments.options import DESIGN, LIMIT_PAIR, asked_limits
 from experiments.pair_options import PairCommand
-from identification.base.command_line import with_force
 from identification.base.errors import InputError
 from identification.base.path_types import OUTPUT_FOLDER
 
-WRITERS = {"c": "c_code", "json": "json_file"}
+WRITERS = {"c": "c_code", "json": "json_file", "fmu": "fmu"}
 """Target -> its module in experiments.export, whose function ``files`` gives the content of each file by its name."""
 
 
-@with_force
 @click.command("export", cls=PairCommand)
 @DESIGN
 @click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
@@ -49,7 +47,7 @@ def export(
     name: str,
     output: Path,
 ) -> None:
-    """Write DESIGN's controller with its anti-windup and limits: NAME.c and NAME.h, NAME.json, ...
+    """Write DESIGN's controller with its anti-windup and limits: NAME.c and NAME.h, NAME.json or NAME.fmu.
 
     Beside it, NAME_test.csv is a run of `sampled` that its commands were checked against.
     """

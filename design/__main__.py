@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import click
 
 from design.choices import GUARANTEES, METHODS, ROBUST_LEVEL, SECTOR
+from identification.base.axis_option import AXIS
 from identification.base.command_line import CommandGroup, together
 from identification.base.digits import lower_end, upper_end
 from identification.base.errors import InputError
@@ -76,6 +77,7 @@ def main() -> None:
 
 @main.command("delay-free")
 @click.argument("model")
+@AXIS
 @frequency_options
 @click.option(
     "--epsilon", type=float, help="Of the factor s^2 + epsilon of Lambda, rad^2/s^2; constants are held nearly."
@@ -132,6 +134,7 @@ def delay_free(
 
 @main.command("extended")
 @click.argument("model")
+@AXIS
 @frequency_options
 @click.option("--a", type=float, help="Closed-loop pole of the free part, rad/s; as fast as W_a allows unless given.")
 @click.option("--e", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")

@@ -12,6 +12,7 @@ import click
 from experiments.options import DESIGN, LIMIT_PAIR, asked_limits, disturbance_options, reference_options
 from experiments.pair_options import PairCommand
 from experiments.tables import csv_writer
+from identification.base.axis_option import AXIS
 from identification.base.command_line import together
 from identification.base.errors import InputError
 from identification.base.files import require_writable, write_whole
@@ -23,6 +24,7 @@ SHARE = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"  # of a run, i
 
 _run_options = together(
     DESIGN,
+    AXIS,
     LIMIT_PAIR,
     click.option(
         "--anti-windup",

@@ -9,6 +9,7 @@ import click
 
 from experiments.options import DESIGN, LIMIT_PAIR, asked_limits, sinusoid_options
 from experiments.pair_options import PairCommand
+from identification.base.axis_option import AXIS
 from identification.base.command_line import together
 from identification.base.errors import InputError
 from identification.base.path_types import OUTPUT_FILE
@@ -30,6 +31,7 @@ plant_options = together(
 
 @click.command("campaign", cls=PairCommand)
 @plant_options
+@AXIS
 @LIMIT_PAIR
 @click.option("--periods", type=int, default=5, help="Length of a run in periods of the reference.")
 @sinusoid_options

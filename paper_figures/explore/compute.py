@@ -121,6 +121,7 @@ class Explorer:
         self.linear = lru_cache(KEPT)(self._linear)
         self.run = lru_cache(KEPT)(self._run)
         self._margins = lru_cache(KEPT)(self._margins_of)
+        self._step = lru_cache(KEPT)(self._step_of)
 
     def _designed(self, choices: Choices) -> Design:
         """The design of the choices, for the rest that of the file; raises InputError as designs do."""
@@ -183,14 +184,15 @@ class Explorer:
     def _linear(self, choices: Choices, true: TruePlant) -> Linear:
         design, plant = self.designed(choices), self.true_plant(true)
         loop = delay_loop(design, plant)
+        model, moved = self._step(choices, self.start.true), self._step(choices, true)
+        nyquist, unstable = nyquist_of(design, plant, loop), roots_right_of(loop, 0.0)
+        return Linear(nyquist, model.time_s, model.outputs["output"], moved.outputs["output"], unstable)
+
+    def _step_of(self, choices: Choices, true: TruePlant) -> Run:
+        design = self.designed(choices)
+        loop = design_loop(design, STEP, "corrected", self.true_plant(true))
         time_s = np.linspace(0.0, STEP_LENGTH * _settled_s(design), STEP_SAMPLES)
-        loops = {
-            "model": design_loop(design, STEP, "corrected"),
-            "true": design_loop(design, STEP, "corrected", plant),
-        }
-        steps = {name: run.outputs["output"] for name, run in run_all(loops, math.inf, time_s).items()}
-        nyquist = nyquist_of(design, plant, loop)
-        return Linear(nyquist, time_s, steps["model"], steps["true"], roots_right_of(loop, 0.0))
+        return run_all({"step": loop}, (-math.inf, math.inf), time_s)["step"]
 
     def _run(self, state: State) -> Run:
         """The saturated run from rest; NaN from where it diverges. Raises InputError as a simulation does."""

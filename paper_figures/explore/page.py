@@ -113,6 +113,7 @@ class Page:
             "format": CustomJSTickFormatter(code=FOUR_DIGITS),
             "name": given.name if given.index is None else f"{given.name}-{given.index}",
             "sizing_mode": "stretch_width",
+            "tooltips": False,  # the title has the value
         }
         values, at = self.state.numbers[given.name], given.index
         if at is None:

@@ -67,6 +67,7 @@ class Pictures:
         self.output = self._over_time("output", "Saturated run: output", signals.output)
         self.control = self._over_time("control", "Saturated run: control", signals.input)
         self.control.x_range = self.output.x_range
+        self.output.xaxis.axis_label = None  # that of the panel below
         self.step = self._over_time("step", "Step of the reference, no limits", signals.output)
         self.nyquist = self._nyquist()
         self._draw_over_time()
@@ -104,6 +105,7 @@ class Pictures:
         for name, curve in (("model", nyquist.model), ("true", nyquist.true)):
             self.data[name].data = {"real": curve.real, "imag": curve.imag}
         holds = np.abs(nyquist.centres + 1) <= nyquist.radii
+        self.nyquist.legend[0].items[1].visible = bool(holds.any())
         for name, chosen in (("discs", ~holds), ("holding", holds)):
             centres = nyquist.centres[chosen]
             self.data[name].data = {"real": centres.real, "imag": centres.imag, "radius": nyquist.radii[chosen]}
@@ -213,8 +215,8 @@ def _view(signals: Sequence[np.ndarray]) -> tuple[float, float]:
     values = np.concatenate([signal[np.isfinite(signal)] for signal in signals])
     largest = float(np.abs(signals[0][np.isfinite(signals[0])]).max(initial=0.0)) * 10 or 1.0
     low, high = max(float(values.min()), -largest), min(float(values.max()), largest)
-    unit = 10.0 ** math.floor(math.log10(max(high - low, 1e-300))) / 2
-    return (math.floor(low / unit) - 0.2) * unit, (math.ceil(high / unit) + 0.2) * unit
+    unit = 10.0 ** math.floor(math.log10(max(high - low, 1e-300))) / 5
+    return (math.floor(low / unit) - 0.5) * unit, (math.ceil(high / unit) + 0.5) * unit
 
 
 def _see(view: Any, ends: tuple[float, float]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import hmac
+import os
 import secrets
 from collections.abc import Callable
 from pathlib import Path
@@ -31,6 +32,7 @@ from paper_figures.explore.state import State, from_words
 
 HOST = "127.0.0.1"
 TOKEN_BYTES = 24
+VALID_S = 10**8  # a page that was opened may be reconnected as long as the server runs
 
 
 class Guard(Router):
@@ -76,7 +78,8 @@ def bound(port: int) -> socket:
     try:
         place = create_server((HOST, port))
     except OSError as error:
-        raise InputError(f"--port is {port}, which cannot be had ({error.strerror}); expected a free one") from None
+        why = os.strerror(error.errno or 0)
+        raise InputError(f"--port is {port}, which cannot be had ({why}); expected a free one") from None
     place.setblocking(False)
     return place
 
@@ -116,9 +119,12 @@ def serve(design: Design, start: State, read: Path, output: Path, place: socket,
 async def _served(application: Application, token: str, place: socket, tell: Callable[[str], object]) -> None:
     port = place.getsockname()[1]
     settings.resources = "server"  # whatever the environment says: no network is needed
-    origins = [f"{HOST}:{port}"]
     guarded = BokehTornado(
-        {"/": application}, prefix=token, extra_websocket_origins=origins, log_function=lambda _handler: None
+        {"/": application},
+        prefix=token,
+        extra_websocket_origins=[f"{HOST}:{port}"],
+        session_token_expiration=VALID_S,
+        log_function=lambda _handler: None,
     )
     http = HTTPServer(Guard(guarded, token, port))
     http.add_sockets([place])
