@@ -122,6 +122,8 @@ def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
     names = ", ".join(test.name + (" (synthetic)" if test.synthetic else "") for test in tests)
     caption = f"Magnitude and phase of {names} and of the model {model.name}, and their distance under the bound W_a."
     used = as_fitted(identified, tests)
+    if identified.fit is not None and identified.fit.covariance is not None:
+        caption += " The band around the model is its 95 % confidence interval, at each frequency by itself."
     if any(test.left_out for test in used):
         caption += " Lines that the fit left out are in another colour."
     if any(test.conjugated for test in used):

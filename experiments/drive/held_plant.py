@@ -9,7 +9,7 @@ from design.blocks.ball import decided
 from design.blocks.block import Block, plant_block
 from design.blocks.state_space import realize
 from design.chapters_3_4.tracking import factored
-from experiments.drive.difference_equations import split
+from experiments.drive.difference_equations import SampledBlock, held, split
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
@@ -87,3 +87,20 @@ def late(samples: int, sample_time_s: float, point: acb, terms: int) -> list[acb
         found.append(factor * z ** (-samples - k) * T**k)
         factor *= arb(-samples - k) / (k + 1)
     return found
+
+
+def sampled_plant(plant: PlantModel, sample_time_s: float) -> SampledBlock:
+    """The plant of :func:`held_plant` as difference equations with one output, whose memory is its dead time."""
+    whole, rest = split(plant.delay_s, sample_time_s)
+    P = realize(plant_block(plant))
+    A, b = held(P, sample_time_s)
+    ahead, into = held(P, (1 - rest) * sample_time_s)
+    return SampledBlock(
+        A=A,
+        b=b,
+        C=P.C @ ahead,
+        d=P.C @ into + P.d,
+        first=np.array([whole + 1]),
+        length=np.array([1]),
+        taps=np.ones((1, 1)),
+    )
