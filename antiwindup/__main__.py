@@ -14,6 +14,7 @@ import click
 from identification.base.command_line import CommandGroup
 
 COMMANDS = {"new": "new_command"} | dict.fromkeys(("refit", "figures", "report"), "commands")
+COMMANDS |= {name: f"{name}_command" for name in ("export", "check", "explore")}
 """Command of this package -> its module."""
 ROOMS = ("identification", "design", "experiments", "paper_figures")
 
@@ -29,6 +30,7 @@ class Rooms(CommandGroup):
             found: click.Command = import_module(f"{cmd_name}.__main__").main
         elif cmd_name in COMMANDS:
             found = getattr(import_module(f"antiwindup.{COMMANDS[cmd_name]}"), cmd_name)
+            self.add_command(found)  # with --force where it writes
         else:
             return None
         return found

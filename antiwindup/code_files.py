@@ -1,8 +1,8 @@
 """Which files of the project each of its commands hangs on, found from the imports.
 
-An import inside a click command belongs to that command alone; every other one belongs to its module, but for those
-that only type checkers read. A file belongs to the modules that name it: by its path, or by its name where it lies
-beside the module or in data/thesis.
+An import inside a click command belongs to that command alone, one of paper_figures in another room only where the
+command has the option --figure; every other one belongs to its module, but for those that only type checkers read. A
+file belongs to the modules that name it: by its path, or by its name where it lies beside the module or in data/thesis.
 """
 
 from __future__ import annotations
@@ -42,9 +42,13 @@ def files_of_command(command: Sequence[str]) -> list[str]:
         for file in _modules(owner)
         if name in read(file)[1] and (owner != "experiments" or not file.startswith("experiments/thesis/"))
     ]
-    needed = [*files_of(f"{room}.__main__"), *found, *(each for file in found for each in read(file)[1][name])]
+    draws = room == "paper_figures" or "--figure" in command
+    own = (each for file in found for each in read(file)[1][name] if draws or not each.startswith("paper_figures/"))
+    needed = [*files_of(f"{room}.__main__"), *found, *own]
     if name == "draw":
         needed += files_of(f"{FIGURES.replace('/', '.')}.{words[1]}")
+    if (room, name) == ("paper_figures", "axis"):
+        needed += files_of(f"paper_figures.axis_figures.{words[1]}")
     if name == "claims":
         needed += [path.relative_to(ROOT).as_posix() for path in (ROOT / CHECKS).glob("*.py")]
     return closure(needed)

@@ -61,6 +61,10 @@ COMMANDS = {
     "bode": ["paper_figures", "bode", "{model}", *SWEEPS, "--output", "{folder}"],
     "summary": ["paper_figures", "summary", "{model}", *SWEEPS, "--build", "{folder}"],
     "report": ["paper_figures", "report", "implied", *SWEEPS, "--build", "{folder}"],
+    "export": [
+        *["antiwindup", "export", "{extended}", "--to", "c", "--rate", "2000", "--limit", "12", "--output", "{folder}"],
+    ],
+    "explore": ["antiwindup", "explore", "{extended}", "--no-browser", "--output", "{folder}/d.json"],
     "refit": ["antiwindup", "refit", *SWEEPS, "--output", "{folder}/built"],
 }  # fmt: skip
 FILES = {
@@ -73,6 +77,7 @@ FILES = {
     "draw": 4,
     "bode": 4,
     "summary": 4,
+    "export": 4,
 }  # others one
 
 KEPT = ("c.parquet.parts/", "built/")  # so that the same command goes on

@@ -11,12 +11,12 @@ import click
 
 from experiments.options import DESIGN, LIMIT_PAIR, asked_limits, disturbance_options, reference_options
 from experiments.pair_options import PairCommand
-from experiments.tables import write_tables
+from experiments.tables import csv_writer
 from identification.base.axis_option import AXIS
 from identification.base.command_line import together
 from identification.base.errors import InputError
-from identification.base.files import require_writable
-from identification.base.path_types import OUTPUT_FILE
+from identification.base.files import require_writable, write_whole
+from identification.base.path_types import FIGURE_FILE, OUTPUT_FILE
 
 MOST_ROWS = 1e7
 UNJUDGED = "Whether the guarantee covers the run is not judged under disturbances"
@@ -44,6 +44,7 @@ _run_options = together(
         "--plant", help="The true plant: a model.json, table or implied; the design's own model unless given."
     ),
     click.option("--output", type=OUTPUT_FILE, required=True, help="CSV to write."),
+    click.option("--figure", type=FIGURE_FILE, help="Draw the run: .pdf, .svg or .png."),
 )
 
 
@@ -69,6 +70,7 @@ def simulate_command(
     noise: tuple[float, float] | None,
     seed: int | None,
     output: Path,
+    figure: Path | None,
     **reference: Any,
 ) -> None:
     """Run DESIGN from rest: time_s, reference, output, error, control, saturated_control; with noise measured."""
@@ -99,7 +101,7 @@ def simulate_command(
     if numbers and anti_windup != "thesis":
         raise InputError(f"--{next(iter(numbers))} belongs to --anti-windup thesis; found --anti-windup {anti_windup}")
     inputs = _inputs(design, plant, reference["reference"])
-    require_writable(output, inputs=inputs)
+    require_writable(output, *([] if figure is None else [figure]), inputs=inputs)
     content = read_design(design)
     kind = content.chosen(anti_windup)
     if numbers:
@@ -137,7 +139,13 @@ def simulate_command(
     else:
         given = guarantee(content, kind, true)
         promised = str(judge_run(given, loop, limits, run, asked, true or content.loop_plant))
-    write_tables({output: table}, inputs)
+    writers = {output: csv_writer(table)}
+    if figure is not None:
+        from paper_figures.look.plot_run import plot_run
+        from paper_figures.look.style import figure_writer
+
+        writers[figure] = figure_writer(plot_run({anti_windup: run}, limits, content.signals))
+    write_whole(writers, inputs)
     beyond, crossings = ("saturated", "crossings of the limits")
     if math.isfinite(rate_limit):
         beyond, crossings = ("saturated or slewing", "beginnings and ends of saturation or slewing")
@@ -150,7 +158,11 @@ def simulate_command(
 @click.command("sampled", cls=PairCommand)
 @_run_options
 @click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
-@click.option("--method", required=True, help="How its blocks are discretised, tustin or exact.")
+@click.option(
+    "--method",
+    help="How it is discretised, matched, tustin or exact: see the README; unless given, that of least steady error "
+    "among those with a stable linear loop.",
+)
 @click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels in its unit; 0, no levels.")
 @click.option("--input-delay", type=float, default=0.0, help="From sample to actuator in seconds.")
 @click.option(
@@ -170,7 +182,7 @@ def sampled_command(
     anti_windup: str,
     until: float,
     rate: float,
-    method: str,
+    method: str | None,
     quantum: float,
     rate_limit: float,
     input_delay: float,
@@ -182,6 +194,7 @@ def sampled_command(
     noise: tuple[float, float] | None,
     seed: int | None,
     output: Path,
+    figure: Path | None,
     **reference: Any,
 ) -> None:
     """Run DESIGN's controller on a computer with a real actuator, a row each sample, the columns as of simulate.
@@ -195,22 +208,27 @@ def sampled_command(
     from design.design_file import read_design
     from experiments.asked_disturbances import disturbances_of
     from experiments.asked_reference import reference_of
-    from experiments.drive.sampled_loop import Drive, simulate_sampled
+    from experiments.drive.choose_method import choose_method
+    from experiments.drive.sampled_loop import METHODS, Drive, simulate_sampled
     from experiments.runs.disturbances import UNDISTURBED
     from experiments.runs.guarantee import guarantee
+    from experiments.runs.references import Reference
     from experiments.runs.region import require_within_region
     from experiments.runs.sector_promise import steady_control, verdict
 
-    drive = Drive(rate, method, asked_limits(limit), quantum, rate_limit, input_delay, resolution)
+    drive = Drive(rate, method or METHODS[0], asked_limits(limit), quantum, rate_limit, input_delay, resolution)
     _require_few_rows(until * rate)
     inputs = _inputs(design, plant, reference["reference"])
-    require_writable(output, inputs=inputs)
+    require_writable(output, *([] if figure is None else [figure]), inputs=inputs)
     content = read_design(design)
     kind = content.chosen(anti_windup)
     asked = reference_of(content, **reference)
     disturbances = disturbances_of(until, input_disturbance, output_disturbance, noise, seed)
     true = None if plant is None else asked_model(plant).plant
     require_within_region(true or content.loop_plant, asked, drive.limits)
+    omegas = asked.frequencies if isinstance(asked, Reference) else None
+    drive, judgement = choose_method(content, drive, method, true, omegas, form)
+    click.echo(judgement)
     with tqdm(total=until * rate, desc="sampled", bar_format=SHARE, disable=None, leave=False) as bar:
         run = simulate_sampled(content, asked, kind, drive, until, true, bar.update, disturbances, form)
     low, high = drive.limits
@@ -226,7 +244,13 @@ def sampled_command(
         if found.covered:
             promised = f"No guarantee on a computer; in continuous time the run would be within it: {found.needs}"
     columns = {name: values for name, values in vars(run).items() if values is not None}
-    write_tables({output: pd.DataFrame(columns)}, inputs)
+    writers = {output: csv_writer(pd.DataFrame(columns))}
+    if figure is not None:
+        from paper_figures.look.plot_run import plot_run
+        from paper_figures.look.style import figure_writer
+
+        writers[figure] = figure_writer(plot_run({anti_windup: run}, drive.limits, content.signals))
+    write_whole(writers, inputs)
     click.echo(_first(promised, f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}"))
 
 

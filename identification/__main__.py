@@ -20,7 +20,7 @@ import click
 from identification.base.axis_option import AXIS
 from identification.base.command_line import CommandGroup, together
 from identification.base.files import require_writable, write_whole
-from identification.base.path_types import INPUT, OUTPUT_FILE
+from identification.base.path_types import FIGURE_FILE, INPUT, OUTPUT_FILE
 from identification.model.additive_bound import HIGHEST_ORDER
 
 
@@ -164,6 +164,7 @@ signal_options = together(
     type=OUTPUT_FILE,
     help="Keep the responses as they were fitted in this .npz, to be given as a SWEEP later.",
 )
+@click.option("--figure", type=FIGURE_FILE, help="Draw the tests and the model as a Bode diagram: .pdf, .svg or .png.")
 @reading_options
 @fit_options
 @signal_options
@@ -184,6 +185,7 @@ def fit(
     output_name: str,
     output_unit: str,
     responses: Path | None,
+    figure: Path | None,
     **reading: Any,
 ) -> None:
     """Fit gain, integrators, modes, real roots and dead time to SWEEP files (raw records or frequency responses)."""
@@ -198,7 +200,7 @@ def fit(
     from identification.sweeps.read_sweeps import input_files, read_sweeps
 
     files = input_files(sweeps)
-    require_writable(output, *([] if responses is None else [responses]), inputs=files)
+    require_writable(*(path for path in (output, responses, figure) if path is not None), inputs=files)
     signals = Signals(input_name, input_unit, output_name, output_unit)
     tests = read_sweeps(sweeps, Reading(**{k: v for k, v in reading.items() if v is not None}))
     with tqdm(desc="fits", unit="", disable=None, leave=False) as bar:
@@ -220,6 +222,11 @@ def fit(
     writers: dict[Path, Callable[[Path], object]] = {output: lambda path: path.write_text(text, encoding="utf-8")}
     if responses is not None:
         writers[responses] = lambda path: write_responses(path, fitted.tests)
+    if figure is not None:
+        from paper_figures.look.bode import plot_bode
+        from paper_figures.look.style import figure_writer
+
+        writers[figure] = figure_writer(plot_bode(fitted.model, fitted.tests))
     write_whole(writers, inputs=files)
     bound = [bound_text(fitted.model.additive_bound), *bound_remarks(fitted.bound_fit)]
     of_tests = [f"{test.name}: {said}" for test in fitted.record.tests for said in (*test.remarks, *test.left_out)]

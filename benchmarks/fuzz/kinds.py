@@ -123,6 +123,7 @@ def designs(rng: random.Random, cheap: bool) -> Case:
             ("design", "audit", "design.json"),
             ("experiments", "simulate", "design.json", *SIMULATE, "--sample-time", "0.01"),
             ("experiments", "sampled", "design.json", *SIMULATE, "--rate", "1000", "--method", "tustin"),
+            ("antiwindup", "export", "design.json", "--to", "c", "--rate", "1000", "--limit", "12", "--output", "out"),
             ("experiments", "thesis", "f-gamma", "design.json", "--output", "out"),
             ("experiments", "thesis", "robustness", "design.json", "--output", "out"),
             ("experiments", "thesis", "interpolation", "design.json", "--output", "out"),

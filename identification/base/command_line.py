@@ -18,8 +18,10 @@ from identification.base.files import write_protected_too
 
 HELP = {"show_default": True, "help_option_names": ["-h", "--help"]}  # of every command
 QUOTED = 80  # characters of a value in a sentence
-WRITTEN = {"output", "page", "build", "responses", "record"}  # options that name what a command writes
-EXTRAS = {"dask": "campaign", "distributed": "campaign", "pyarrow": "campaign"}  # of pyproject.toml, by their modules
+WRITTEN = {"output", "page", "build", "responses", "record", "figure", "junit", "markdown"}
+"""Options that name what a command writes."""
+EXTRAS = {"bokeh": "explore"} | dict.fromkeys(("dask", "distributed", "pyarrow"), "campaign")
+"""The extras of pyproject.toml by the modules that they install."""
 
 
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]

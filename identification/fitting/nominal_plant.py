@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc, stdtrit
+from scipy.special import chdtrc
 
 from identification.base.arrays import Real
 from identification.base.errors import InputError
 from identification.fitting.likelihood import maximise_together
 from identification.fitting.one_fit import OneFit
 from identification.fitting.single_test_fit import FINE, ScaledTest
+from identification.model.covariance import Covariance, Matrix
 from identification.model.plant import PlantModel
 from identification.model.structure import Structure
 
-CONFIDENCE = 0.95
 ONE_PLANT = 0.01  # probability below which tests of one plant do not differ as much as these do
 NOISE = 2  # parameters of a test's noise
 WIDEST = 20.0  # half width, a logarithm, beyond which an interval says nothing
@@ -35,26 +35,20 @@ class Nominal:
         of each test's own.
     sign
         Of the gain.
-    noise, misfit, scatter
-        (p,) standard errors of theta: from residuals that are noise, from residuals that are not but what the model
-        leaves, and from how the tests differ (None for one test). The scatter contains the noise.
+    covariance
+        Of theta; it has a scatter where the tests differ by more than their noise.
+    scatter
+        (p,) standard errors of theta from how the tests differ (None for one test). They contain the noise.
     agreement
         Probability that tests of one plant differ as much as these do (None for one test).
-    count
-        Number of tests.
-    freedom
-        Of the residuals of all tests, real numbers less parameters.
     """
 
     structure: Structure
     theta: Real
     sign: float
-    noise: Real
-    misfit: Real
+    covariance: Covariance
     scatter: Real | None
     agreement: float | None
-    count: int
-    freedom: int
 
     @property
     def plant(self) -> PlantModel:
@@ -62,9 +56,19 @@ class Nominal:
         return self.structure.plant(self.theta, self.sign)
 
     @property
+    def noise(self) -> Real:
+        """(p,) standard errors of theta from residuals that are noise."""
+        return np.sqrt(np.diag(self.covariance.noise))
+
+    @property
+    def misfit(self) -> Real:
+        """(p,) standard errors of theta from residuals that are no noise but what the model leaves."""
+        return np.sqrt(np.diag(self.covariance.misfit))
+
+    @property
     def scattered(self) -> bool:
         """Whether the tests differ by more than their noise."""
-        return self.agreement is not None and self.agreement < ONE_PLANT
+        return self.covariance.scatter is not None
 
     @property
     def errors(self) -> Real:
@@ -74,13 +78,8 @@ class Nominal:
 
     @property
     def half_widths(self) -> Real:
-        """(p,) of the 95 % intervals of theta, by Student's distribution: noise and scatter are estimated."""
-        usual = stdtrit(self.freedom, (1 + CONFIDENCE) / 2)
-        random = usual * self.noise
-        if self.scatter is not None and self.scattered:
-            student = stdtrit(self.count - 1, (1 + CONFIDENCE) / 2)
-            random = np.maximum(random, student * self.scatter)
-        return np.minimum(np.hypot(random, usual * self.misfit), WIDEST)
+        """(p,) of the 95 % intervals of theta."""
+        return np.minimum(self.covariance.half_widths(np.eye(self.theta.size)), WIDEST)
 
     @property
     def intervals(self) -> tuple[Real, Real]:
@@ -128,12 +127,12 @@ def nominal_of(tests: Sequence[ScaledTest], fits: Sequence[OneFit]) -> Nominal:
     thetas, count = np.array([fit.theta for fit in fits]), len(fits)
     structure, theta, agreement, scatter = fits[0].structure, thetas.mean(axis=0), None, None
     covariances = np.array([fit.covariance for fit in fits])
-    variances = np.einsum("tii->ti", covariances)
-    noise = variances.mean(axis=0) / count
+    noise = covariances.mean(axis=0) / count
     if count > 1:
-        scatter = thetas.std(axis=0, ddof=1) / np.sqrt(count)
+        scatter = np.cov(thetas, rowvar=False) / count
         one, increase = _together(tests, fits)
         together = chdtrc(structure.free * (count - 1), increase)
+        variances = np.einsum("tii->ti", covariances)
         mean = np.average(thetas, axis=0, weights=1 / variances)
         alone = chdtrc(count - 1, np.sum((thetas - mean) ** 2 / variances, axis=0))
         agreement = float(min(1.0, 2 * together, 2 * structure.free * alone.min()))
@@ -145,23 +144,32 @@ def nominal_of(tests: Sequence[ScaledTest], fits: Sequence[OneFit]) -> Nominal:
             # in units of typical standard errors, where the matrices are well conditioned
             units = np.sqrt(variances.mean(axis=0))
             information = np.linalg.inv(covariances / np.outer(units, units)).sum(axis=0)
-            noise = np.diag(np.linalg.inv(information)) * units**2
+            noise = np.linalg.inv(information) * np.outer(units, units)
             # weights that are estimated make a mean less sure than known ones (Meier, Biometrics 9, 1953)
             shares = 1 / variances / np.sum(1 / variances, axis=0)
             freedoms = np.array([[fit.lines * 2 - structure.free - NOISE] for fit in fits])
-            noise *= 1 + np.sum(4 / np.maximum(freedoms, 1) * shares * (1 - shares), axis=0)
-    misfit = np.mean([fit.misfit * variance for fit, variance in zip(fits, variances, strict=True)], axis=0)
+            wider = np.sqrt(1 + np.sum(4 / np.maximum(freedoms, 1) * shares * (1 - shares), axis=0))
+            noise *= np.outer(wider, wider)
+    misfit = np.mean([fit.misfit * covariance for fit, covariance in zip(fits, covariances, strict=True)], axis=0)
+    differ = agreement is not None and agreement < ONE_PLANT
     return Nominal(
         structure=structure,
         theta=theta,
         sign=signs.pop(),
-        noise=np.sqrt(noise),
-        misfit=np.sqrt(misfit),
-        scatter=scatter,
+        covariance=Covariance(
+            noise=_rows(noise),
+            misfit=_rows(misfit),
+            scatter=None if scatter is None or not differ else _rows(scatter),
+            freedom=max(1, sum(2 * fit.lines - structure.free - NOISE for fit in fits)),
+            count=count,
+        ),
+        scatter=None if scatter is None else np.sqrt(np.diag(scatter)),
         agreement=agreement,
-        count=count,
-        freedom=max(1, sum(2 * fit.lines - structure.free - NOISE for fit in fits)),
     )
+
+
+def _rows(matrix: Real) -> Matrix:
+    return tuple(map(tuple, ((matrix + matrix.T) / 2).tolist()))
 
 
 def _together(tests: Sequence[ScaledTest], fits: Sequence[OneFit]) -> tuple[Real, float]:

@@ -19,6 +19,7 @@ from identification.base.json_object import (
     words,
 )
 from identification.model.additive_bound import AdditiveBound
+from identification.model.covariance import Covariance
 from identification.model.plant import PlantModel
 from identification.model.plant_json import from_shape, plant_from_dict, plant_to_dict, shaped
 from identification.model.reports import BoundReport, SubspaceCheck
@@ -168,6 +169,8 @@ class FitRecord:
         W_a and how tight it is.
     checks
         By a test's name, what a subspace model of its raw record says.
+    covariance
+        Of the parameters together; None where an older version wrote the file.
     """
 
     source: str
@@ -187,6 +190,7 @@ class FitRecord:
     tests: tuple[FittedTest, ...]
     bound: BoundReport
     checks: Mapping[str, SubspaceCheck]
+    covariance: Covariance | None = None
 
     @property
     def conjugated(self) -> bool:
@@ -212,6 +216,7 @@ class FitRecord:
             "noise_standard_errors": shaped(plant, self.noise),
             "misfit_standard_errors": shaped(plant, self.misfit),
             "scatter_standard_errors": None if self.scatter is None else shaped(plant, self.scatter),
+            "covariance": None if self.covariance is None else self.covariance.to_dict(),
             "agreement_of_tests": self.agreement_of_tests,
             "median_distances": list(self.median_distances),
             "cautions": list(self.cautions),
@@ -254,6 +259,9 @@ class FitRecord:
             tests=tuple(FittedTest.from_dict(test) for test in objects(content, "tests")),
             bound=BoundReport.from_dict(member(content, "bound"), bound),
             checks={words(each, "test"): SubspaceCheck.from_dict(each) for each in objects(content, "subspace_check")},
+            covariance=None
+            if content.get("covariance") is None
+            else Covariance.from_dict(member(content, "covariance"), len(plant.parameters)),
         )
 
 

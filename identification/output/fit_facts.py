@@ -65,6 +65,7 @@ def fit_record(
         cautions=tuple(cautions(result, tests, reversed_from)),
         bound=report,
         checks=checks,
+        covariance=nominal.covariance,
     )
 
 

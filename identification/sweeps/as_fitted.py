@@ -21,9 +21,9 @@ def as_fitted(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> lis
         As they are read, or as they were kept.
     """
     fitted = {} if model.fit is None else {test.name: test for test in model.fit.tests}
-    together = joined(tests)
+    together = joined(tests) if tests else None
     found = []
-    for test in [together] if together.name in fitted else tests:
+    for test in [together] if together is not None and together.name in fitted else tests:
         used = alias_free(test, model.plant)
         if (own := fitted.get(used.name)) is not None:
             used = conjugated(used) if own.conjugated != used.conjugated else used

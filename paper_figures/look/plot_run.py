@@ -1,41 +1,155 @@
-"""One run over time: output and reference, error, control."""
+"""Runs over time: output and reference, error, control, and when it is saturated."""
 
 from __future__ import annotations
 
-import numpy as np
-from matplotlib.figure import Figure
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from typing import Any
 
-from experiments.engine.simulate import Run
-from paper_figures.look.style import FULL_WIDTH, LINES, styled
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from experiments.drive.sampled_loop import SampledRun
+from experiments.engine.simulate import Run, limit_pair
+from identification.base.arrays import Real
+from identification.base.errors import InputError
+from identification.model.signals import UNNAMED, Signals
+from paper_figures.look.frequency_axis import plain
+from paper_figures.look.panels import MOST_POINTS, band, envelope, key, view
+from paper_figures.look.stretches import saturated_stretches
+from paper_figures.look.style import FAMILY, FULL_WIDTH, LINES, panel_letters, styled
+
+AnyRun = Run | SampledRun
+
+KINDS = {
+    "none": "without anti-windup",
+    "thesis": "thesis anti-windup",
+    "corrected": "corrected anti-windup",
+    "internal-model": "internal model",
+    "weston-postlethwaite": "Weston and Postlethwaite",
+    **{name: name for name in ("back-calculation", "conditioning", "observer", "static")},
+}
+"""The lines of the runs of each anti-windup by its name; others have the next one of the family's."""
+SATURATED: dict[str, Any] = {"facecolor": "#E9DFC6", "edgecolor": "none", "zorder": 0.5}
+THIN = 0.9
+FAR = 1.0  # times the view of the control, within which a limit that it does not reach is shown too
+EDGE = 0.06
+BEYOND = 1.0  # of the range of the limits, up to which u is shown above and below them
 
 
 @styled()
-def plot_run(run: Run) -> Figure:
-    """Draw a run.
+def plot_run(
+    runs: AnyRun | Mapping[str, AnyRun],
+    limits: float | Sequence[float] | None = None,
+    signals: Signals = UNNAMED,
+) -> Figure:
+    """Draw a run, or several of one reference one upon the other.
 
     Parameters
     ----------
-    run
-        With the outputs ``reference``, ``output`` and ``error``.
+    runs
+        One, or several by name: ``none``, ``corrected`` and the other anti-windups have lines of their own.
+    limits
+        Of the actuator, (lower, upper), or one number for +-limits: drawn as lines, and where the control is beyond
+        them is shaded. Neither unless given.
+    signals
+        Names and units of the plant's input and output; those of a design are ``design.signals``.
 
     Returns
     -------
     Figure
-        Three panels over the time in seconds: reference and output; their difference; the control asked for and what
-        saturation leaves of it, between its extremes, which are the limits where the run saturates.
+        Over the time in seconds: reference and outputs; errors; and for each run the control asked for upon what the
+        actuator gives out. What is far beyond the limits leaves the panel.
+
+    Raises
+    ------
+    InputError
+        There is no run, or the limits are none, see :func:`experiments.engine.simulate.limit_pair`.
     """
-    figure = Figure(figsize=(FULL_WIDTH, 4.6), layout="constrained")
-    output, error, control = figure.subplots(3, 1, sharex=True)
-    output.plot(run.time_s, run.outputs["reference"], label="reference r", **LINES["reference"])
-    output.plot(run.time_s, run.outputs["output"], label="output y", **LINES["model"])
-    error.plot(run.time_s, run.outputs["error"], label="error r - y", **LINES["model"])
-    control.plot(run.time_s, run.control, label="control u", **LINES["without anti-windup"])
-    control.plot(run.time_s, run.saturated_control, label="sat(u)", **LINES["model"])
-    low, high = np.min(run.saturated_control), np.max(run.saturated_control)
-    room = 0.5 * (high - low) or 1.0
-    control.set_ylim(low - room, high + room)  # u may be many times the limits
-    for panel, unit in ((output, "output unit"), (error, "output unit"), (control, "input unit")):
-        panel.set_ylabel(unit)
-        panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=2)
-    control.set_xlabel("time [s]")
+    named = dict(runs) if isinstance(runs, Mapping) else {"": runs}
+    if not named:
+        raise InputError("no run was given; expected one or more")
+    pair = None if limits is None else limit_pair(limits)
+    figure = Figure(figsize=(FULL_WIDTH, 3.0 + 1.5 * len(named)), layout="constrained")
+    panels = list(figure.subplots(2 + len(named), 1, sharex=True))
+    output, error, controls = panels[0], panels[1], panels[2:]
+    looks, first = _looks(named), next(iter(named.values()))
+    reference = _signal(first, "reference")
+    scale = float(np.max(np.abs(reference)))
+    _line(output, first, reference, LINES["reference"], "reference $r$")
+    for panel, name, symbol in ((output, "output", "$y$"), (error, "error", "$r - y$")):
+        for run_name, run in named.items():
+            _line(panel, run, _signal(run, name), looks[run_name], f"{symbol}{_beside(run_name)}")
+        values = [_signal(run, name) for run in named.values()]
+        panel.set_ylim(*view([*values, reference] if name == "output" else values, scale))
+        key(panel)
+    output.set_xlim(min(run.time_s[0] for run in named.values()), max(run.time_s[-1] for run in named.values()))
+    output.set_ylabel(plain(signals.output))
+    error.set_ylabel(plain(f"error [{signals.output_unit}]" if signals.output_unit else "error"))
+    for panel, (name, run) in zip(controls, named.items(), strict=True):
+        _control(panel, name, run, looks[name], pair)
+        panel.set_ylabel(plain(signals.input))
+    controls[-1].set_xlabel("Time [s]")
+    for panel in panels:
+        panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.7g}"))
+    panel_letters(panels)
+    figure.align_ylabels()
     return figure
+
+
+def _control(panel: Axes, name: str, run: AnyRun, line: Mapping[str, Any], limits: tuple[float, float] | None) -> None:
+    """Draw what is asked for upon what the actuator gives out, the limits, and when it is beyond them."""
+    low, high = limits or (-np.inf, np.inf)
+    _line(panel, run, run.saturated_control, band(line), "actuator")
+    _line(panel, run, run.control, {**line, "linewidth": THIN}, f"control $u${_beside(name)}")
+    ends = [end for end in (low, high) if isfinite(end)]
+    least = low if isfinite(low) else float(run.saturated_control.min())
+    most = high if isfinite(high) else float(run.saturated_control.max())
+    room = BEYOND * (most - least) or 1.0
+    bottom, top = view([run.control, run.saturated_control], 0.0)
+    bottom, top = max(bottom, least - room), min(top, most + room)
+    near = [end for end in ends if bottom - FAR * (top - bottom) < end < top + FAR * (top - bottom)]
+    edge = EDGE * (top - bottom)
+    panel.set_ylim(min([bottom, *(end - edge for end in near)]), max([top, *(end + edge for end in near)]))
+    for i, end in enumerate(ends):
+        panel.axhline(end, **LINES["saturation limits"], zorder=3, label=None if i else "limits")
+    if limits is not None:
+        bars = _merged(saturated_stretches(run, limits), float(run.time_s[-1] - run.time_s[0]) / MOST_POINTS)
+        if len(bars):
+            spans = [(start, end - start) for start, end in bars]
+            across = panel.get_xaxis_transform()
+            panel.broken_barh(spans, (0, 1), transform=across, label="beyond them", **SATURATED)
+    key(panel)
+
+
+def _line(panel: Axes, run: AnyRun, values: Real, line: Mapping[str, Any], label: str) -> None:
+    """A line, thinned to its envelope; where two meet, the thin one lies upon the broad one."""
+    panel.plot(*envelope(run.time_s, values), **line, label=label, zorder=3 - line["linewidth"] / 10)
+
+
+def _merged(stretches: Real, gap_s: float) -> Real:
+    """The stretches (n, 2) as they are seen: those less than a gap apart are one."""
+    if not len(stretches):
+        return stretches
+    new = np.append(True, stretches[1:, 0] - stretches[:-1, 1] > gap_s)
+    last = np.append(new[1:], True)
+    return np.column_stack([stretches[new, 0], stretches[last, 1]])
+
+
+def _signal(run: AnyRun, name: str) -> Real:
+    return np.asarray(run.outputs[name] if isinstance(run, Run) else getattr(run, name))
+
+
+def _beside(name: str) -> str:
+    """What a key adds to the symbol of a run's signal."""
+    return f", {plain(KINDS.get(name, name))}" if name else ""
+
+
+def _looks(named: Mapping[str, AnyRun]) -> dict[str, dict[str, Any]]:
+    """The line of each run: that of its anti-windup, else the next of the family's."""
+    looks, rest = {}, iter(FAMILY * len(named))
+    for name in named:
+        looks[name] = LINES[KINDS.get(name) or next(rest)] if name else LINES["model"]
+    return looks

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from io import BytesIO
@@ -121,15 +121,22 @@ def rendered(figure: Figure, folder: Path, name: str, caption: str) -> dict[Path
     caption
         The caption, paragraphs of printable text.
     """
+    files = {folder / f"{name}.txt": f"{printable_lines(caption)}\n".encode()}
+    return files | {folder / f"{name}.{kind}": _rendered_as(figure, kind) for kind in _METADATA}
+
+
+def figure_writer(figure: Figure) -> Callable[[Path], object]:
+    """What writes a figure, as PDF, SVG or PNG by the suffix of the path, the same bytes from run to run."""
+    return lambda path: path.write_bytes(_rendered_as(figure, path.suffix[1:].lower()))
+
+
+def _rendered_as(figure: Figure, kind: str) -> bytes:
     for text in figure.findobj(Text):
         if (escaped := printable_lines(text.get_text())) != text.get_text():
             text.set_text(escaped)
-    files = {folder / f"{name}.txt": f"{printable_lines(caption)}\n".encode()}
     with styled():
-        for kind, metadata in _METADATA.items():
-            figure.savefig(written := BytesIO(), format=kind, metadata=metadata)
-            files[folder / f"{name}.{kind}"] = written.getvalue()
-    return files
+        figure.savefig(written := BytesIO(), format=kind, metadata=_METADATA[kind])
+    return written.getvalue()
 
 
 def write(files: Mapping[Path, bytes]) -> None:

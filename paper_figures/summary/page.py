@@ -16,6 +16,7 @@ from identification.model.model_file import IdentifiedModel
 from identification.sweeps.response import FrequencyResponse
 from paper_figures.look import panels, style
 from paper_figures.look.bode import draw_distance, draw_magnitude, draw_phase, draw_relative_distance
+from paper_figures.look.frequency_axis import HERTZ
 from paper_figures.summary.of_fit import Paragraph, Table, fitted
 from paper_figures.summary.words import Summary
 
@@ -29,6 +30,9 @@ HINTED = 1.05  # width of letters fitted to the pixels of a PNG, to that of the 
 SPACE = 0.25  # width of a space, of the letters' size
 GAP = 0.3  # widest between the columns of a table [in]
 SYNTHETIC = "#D55E00"
+SMALL = 7.0  # of the panels' keys [pt]
+SHORT = {"95 % confidence of the model": "95 % confidence"}
+"""What the panels' keys have less room for."""
 
 SYMBOLS = {
     "omega": r"$\omega$",
@@ -81,9 +85,10 @@ def draw(summary: Summary, model: IdentifiedModel, tests: Sequence[FrequencyResp
         The plant with its bound, and the responses that it was fitted to.
     """
     for size in SIZES:
-        above = [_heading(summary, size), _table(summary.parameters, size), _paragraphs(summary.basis, size)]
-        below = [_table(summary.loops, size)] if summary.loops else []
-        below.append(_paragraphs(summary.designs, size))
+        above = [_heading(summary, size), _paragraphs(summary.advice, size), _table(summary.parameters, size)]
+        above.append(_paragraphs(summary.basis, size))
+        below = [_table(summary.runs, size)] if summary.runs else []
+        below.append(_paragraphs((*summary.designs, *summary.refused), size))
         room = HEIGHT - 2 * MARGIN - sum(block.height for block in (*above, *below))
         if room >= LEAST:
             break
@@ -115,17 +120,21 @@ def _panels(
     )
     places = [grid[row, column] for row in range(2) for column in range(2)]
     magnitude, distance, phase, relative = map(figure.add_subplot, places)
-    draw_magnitude(magnitude, tests, model.plant)
-    draw_phase(phase, tests, model.plant)
+    draw_magnitude(magnitude, model, tests)
+    draw_phase(phase, model, tests)
     touches_omega = [touch.omega for touch in fitted(model).bound.touches]
-    draw_distance(distance, tests, model.plant, model.additive_bound, touches_omega)
-    draw_relative_distance(relative, tests, model.plant, model.additive_bound)
+    draw_distance(distance, model, tests, touches_omega)
+    draw_relative_distance(relative, model, tests)
     for panel in (magnitude, distance):
         panel.tick_params(labelbottom=False, which="both")
-    for panel in (phase, relative):
-        panel.set_xlabel(r"$\omega$ [rad/s]")
     for panel in figure.axes:
-        for line in panel.legend(ncols=3, **panels.ABOVE).get_lines():
+        panel.yaxis.label.set_fontsize(SMALL)
+    for panel in (phase, relative):
+        panel.set_xlabel(HERTZ)
+    for panel in (magnitude, distance, relative):  # the phase has the lines of the magnitude
+        handles, labels = panel.get_legend_handles_labels()
+        said = [SHORT.get(label, label) for label in labels]
+        for line in panel.legend(handles, said, ncols=4, fontsize=SMALL, **panels.ABOVE).get_lines():
             line.set_markersize(4)
     figure.align_ylabels()
     style.panel_letters((magnitude, phase, distance, relative))

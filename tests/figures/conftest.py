@@ -1,8 +1,10 @@
-"""What the tests of all figures share: where their texts stand, and that they are drawn the same twice."""
+"""What the tests of figures and pages share: where texts stand, that they are drawn the same twice, a browser."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import os
+import shutil
+from collections.abc import Callable, Iterable, Iterator
 from io import BytesIO
 
 import pytest
@@ -10,8 +12,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
+from playwright.sync_api import Browser, sync_playwright
 
 from paper_figures.look import style
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 
 AsPdf = Callable[[Figure], bytes]
 Extents = Callable[[Figure, Callable[[Figure], Iterable[Text]]], list[tuple[str, Bbox]]]
@@ -46,3 +51,16 @@ def as_pdf() -> AsPdf:
         return written.getvalue()
 
     return as_pdf
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    path = next(filter(None, map(shutil.which, NAMES)), None)
+    if path is None:
+        said = f"none of {', '.join(NAMES)} is on the PATH; install one of them, such as Debian's package chromium"
+        pytest.fail(said) if os.environ.get("CI") else pytest.skip(said)
+    with sync_playwright() as playwright:
+        root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+        browser = playwright.chromium.launch(executable_path=path, args=root)
+        yield browser
+        browser.close()

@@ -403,7 +403,7 @@ def test_panels_show_tests_model_and_bound():
     assert [len(panel.lines) for panel in figure.axes] == [4, 5, 4, 4]
     assert magnitude.lines[-1].get_zorder() >= magnitude.lines[0].get_zorder()
     ring = figure.axes[1].lines[-1]
-    assert ring.get_xdata() == pytest.approx([55.5])
+    assert ring.get_xdata() == pytest.approx([55.5 / (2 * np.pi)])
     assert ring.get_ydata() == pytest.approx(20 * np.log10(np.abs(SIMPLE(55.5j))).reshape(1))
     assert [panel.get_xlabel() != "" for panel in figure.axes] == [False, False, True, True]
     letters = [text.get_text() for panel in (magnitude, phase, figure.axes[1], relative) for text in panel.texts]

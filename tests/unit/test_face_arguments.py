@@ -83,8 +83,8 @@ def test_an_anti_windup_and_limits_as_they_come(extended_design: Design) -> None
 def test_what_cannot_be_meant(implied: IdentifiedModel) -> None:
     with pytest.raises(InputError, match="the method is 'foo'; expected one of zeros, lagrange, poles"):
         design.extended(implied, [1.5], 4.0, [(2.0, 1.0)], method="foo")
-    with pytest.raises(InputError, match="no test was given"):
-        paper_figures.plot_bode(implied, [])
+    with pytest.raises(InputError, match="no run was given"):
+        paper_figures.plot_run({})
 
 
 def test_objects_say_in_a_line_what_they_are(extended_design: Design, implied: IdentifiedModel) -> None:

@@ -1,0 +1,76 @@
+"""``antiwindup explore``: a design on a local page, to play with."""
+
+from __future__ import annotations
+
+from itertools import chain, count
+from pathlib import Path
+
+import click
+
+from experiments.options import DESIGN, asked_limits
+from experiments.pair_options import NumberPair, PairCommand
+from identification.base.files import is_there, require_writable
+from identification.base.path_types import OUTPUT_FILE
+
+
+@click.command("explore", cls=PairCommand)
+@DESIGN
+@click.option(
+    "--limit",
+    type=NumberPair(),
+    metavar="[LOW] HIGH",
+    help="Limits that the page begins with; unless given, 1.2 times the control that the reference needs.",
+)
+@click.option(
+    "--amplitude", type=float, multiple=True, help="Of the reference, once a frequency of DESIGN; 1 unless given."
+)
+@click.option("--phase", type=float, multiple=True, help="In radians; once a frequency; pi/2, a crest, unless given.")
+@click.option("--port", type=click.IntRange(1024, 65535), help="Of 127.0.0.1; a free one unless given.")
+@click.option("--no-browser", is_flag=True, help="Open no browser; the address is printed in any case.")
+@click.option(
+    "--output", type=OUTPUT_FILE, help="What 'save' writes; a new name beside DESIGN unless given, never DESIGN itself."
+)
+def explore(
+    design: Path,
+    limit: tuple[float, ...] | None,
+    amplitude: tuple[float, ...],
+    phase: tuple[float, ...],
+    port: int | None,
+    no_browser: bool,
+    output: Path | None,
+) -> None:
+    """Open a local page with sliders for DESIGN: run, Nyquist plot, step, audit.
+
+    All are redrawn as a slider is dragged. The page is for this machine alone, and ends with Ctrl-C. Its address holds
+    what the sliders say, so that a copy of it opens the same page as long as the command runs; "save" writes the
+    design shown as design.json.
+    """
+    import webbrowser
+
+    from tqdm import tqdm
+
+    from design.design_file import read_design
+    from paper_figures.explore.server import bound, serve
+    from paper_figures.explore.state import start_of
+
+    target = output or _new_name(design)
+    require_writable(target, inputs=[design])
+    content = read_design(design)
+    start = start_of(content, None if limit is None else asked_limits(limit), amplitude, phase)
+
+    def tell(address: str) -> None:
+        click.echo(address, err=True)  # at once: what a command prints appears when it is done
+        if not no_browser:
+            webbrowser.open(address)
+
+    with tqdm(bar_format="Ctrl-C ends it", disable=None, leave=False):
+        serve(content, start, design, target, bound(port or 0), tell)
+
+
+def _new_name(design: Path) -> Path:
+    numbers = chain([""], (f"_{number}" for number in count(2)))
+    return next(
+        path
+        for number in numbers
+        if not is_there(path := design.with_name(f"{design.stem}_explored{number}{design.suffix}"))
+    )

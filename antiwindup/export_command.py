@@ -1,0 +1,86 @@
+"""The command ``export``: the controller of a design for the computer that is to run it."""
+
+from __future__ import annotations
+
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+
+import click
+
+from experiments.options import DESIGN, LIMIT_PAIR, asked_limits
+from experiments.pair_options import PairCommand
+from identification.base.axis_option import AXIS
+from identification.base.errors import InputError
+from identification.base.path_types import OUTPUT_FOLDER
+
+WRITERS = {"c": "c_code", "json": "json_file", "fmu": "fmu"}
+"""Target -> its module in experiments.export, whose function ``files`` gives the content of each file by its name."""
+
+
+@click.command("export", cls=PairCommand)
+@DESIGN
+@AXIS
+@click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
+@click.option("--to", type=click.Choice(list(WRITERS)), required=True, help="What is written.")
+@LIMIT_PAIR
+@click.option(
+    "--anti-windup",
+    default="corrected",
+    help="none, thesis, corrected, another of DESIGN, or one of others: see the README.",
+)
+@click.option(
+    "--method",
+    help="How it is discretised, matched, tustin or exact: see the README; unless given, that of `sampled`.",
+)
+@click.option(
+    "--precision",
+    type=click.Choice(["double", "float"]),
+    default="double",
+    help="Of all numbers, with --to c.",
+)
+@click.option("--name", default="controller", help="Of the files and of what they define; letters and digits.")
+@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder for the files.")
+def export(
+    design: Path,
+    rate: float,
+    to: str,
+    limit: tuple[float, ...],
+    anti_windup: str,
+    method: str | None,
+    precision: str,
+    name: str,
+    output: Path,
+) -> None:
+    """Write DESIGN's controller with its anti-windup and limits: NAME.c and NAME.h, NAME.json or NAME.fmu.
+
+    Beside it, NAME_test.csv is a run of `sampled` that its commands were checked against.
+    """
+    from design.design_file import read_design
+    from experiments.drive.choose_method import choose_method
+    from experiments.drive.judge_loop import judge_loop
+    from experiments.drive.sampled_loop import METHODS, Drive
+    from experiments.export.check_run import check_run
+    from experiments.export.controller import sampled_controller
+    from experiments.export.names import require_name
+    from identification.base.files import write_whole
+
+    if precision != "double" and to != "c":
+        raise InputError(f"--precision {precision} belongs to --to c; found --to {to}")
+    require_name(name)
+    drive = Drive(rate, method or METHODS[0], asked_limits(limit))
+    content = read_design(design)
+    drive, judgement = choose_method(content, drive, method)
+    if not judge_loop(content, drive).stable:
+        raise InputError(judgement)
+    controller = sampled_controller(content, anti_windup, drive.limits, rate, drive.method, name)
+    choices = {"precision": precision} if to == "c" else {}
+    files = import_module(f"experiments.export.{WRITERS[to]}").files(
+        controller, check_run(content, controller), **choices
+    )
+    write_whole({output / file: partial(_write, content=written) for file, written in files.items()}, [design])
+    click.echo(f"{judgement}. {controller.promise}; {', '.join(files)} -> {output}")
+
+
+def _write(path: Path, content: str | bytes) -> None:
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
