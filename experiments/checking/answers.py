@@ -52,7 +52,7 @@ class Answer:
 
 def answers(found: ModelCheck) -> tuple[Answer, ...]:
     """The answers, sweep by sweep."""
-    return tuple(each for sweep in found.sweeps for each in _of_sweep(found, sweep))
+    return tuple(each for sweep in found.sweeps for each in answers_of_sweep(found, sweep))
 
 
 def has_moved(given: Sequence[Answer]) -> bool:
@@ -60,7 +60,9 @@ def has_moved(given: Sequence[Answer]) -> bool:
     return any(each.outcome is Outcome.MOVED for each in given)
 
 
-def _of_sweep(found: ModelCheck, sweep: SweepCheck) -> Iterator[Answer]:
+def answers_of_sweep(found: ModelCheck, sweep: SweepCheck) -> Iterator[Answer]:
+    """The answers about one sweep."""
+
     def answer(question: str, outcome: Outcome, sentence: str) -> Answer:
         return Answer(sweep.name, question, outcome, sentence)
 
@@ -125,7 +127,8 @@ def _by(move: Move) -> str:
     if move.errors == inf:
         return "to the other sign"
     how = f"by {relative(move.share)}" if move.parameter.value else f"from 0 to {1e3 * move.value:.3g} ms"
-    return f"{how} ({abs(move.errors):.3g} standard errors)"
+    errors = abs(move.errors)
+    return f"{how} ({errors:.{3 if errors < 1000 else 4}g} standard errors)"
 
 
 def relative(share: float) -> str:
@@ -143,7 +146,7 @@ def _margins(promised: Promise, on_plant: OnPlant, is_within: bool) -> tuple[Out
     if not isinstance(before, Margins):
         return Outcome.OPEN, f"the design has none with its own model: {before}"
     if not isinstance(after, Margins):
-        return Outcome.MOVED, f"the loop is NOT stable with the new plant: {after}"
+        return Outcome.MOVED, f"the loop is NOT stable with the new plant ({after})"
     new, old = told_apart(after.modulus.value, before.modulus.value, 3, lambda value, digits: f"{value:.{digits}g}")
     robust = f"|W_a C S| reaches {before.W_a_C_S.value:.3g} and promises nothing"
     if promised.modulus:
@@ -162,8 +165,10 @@ def _guarantee(promised: Promise, on_plant: OnPlant) -> tuple[Outcome, str]:
         return Outcome.MOVED, "nothing is guaranteed of a loop that is not stable"
     found, asked = told_apart(on_plant.sector, promised.sector, 3, sector_text)
     if on_plant.sector < (1 - LOST) * promised.sector:
-        lost = "an end of windup whatever the control" if promised.sector >= 1 else f"the sector {asked}"
-        return Outcome.MOVED, f"{lost} is NOT guaranteed with the new plant: the circle criterion gives {found}"
+        lost = f"the circle criterion gives the sector {found}, and {asked} is promised"
+        if promised.sector >= 1:
+            lost = f"it is NOT guaranteed that windup ends whatever the control: the circle criterion gives {found}"
+        return Outcome.MOVED, f"with the new plant {lost}"
     if promised.sector >= 1:
         return Outcome.HOLDS, "windup ends whatever the control with the new plant too (found on a grid, not proved)"
-    return Outcome.HOLDS, f"the circle criterion gives the sector {found} (on a grid, not proved), {asked} is asked for"
+    return Outcome.HOLDS, f"the circle criterion gives the sector {found} (on a grid, not proved), {asked} is promised"

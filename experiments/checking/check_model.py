@@ -33,6 +33,8 @@ class SweepCheck:
         Of each parameter; None where the model does not say how sure its own are, or without a fit.
     design
         What the design has on the fitted plant; None without a fit or a design.
+    more_left
+        Whether neighbouring residuals correlate by more than chance, which those of the model's tests did not.
     """
 
     name: str
@@ -43,6 +45,7 @@ class SweepCheck:
     between_lines: Reach | None = None
     moves: tuple[Move, ...] | None = None
     design: OnPlant | None = None
+    more_left: bool = False
 
 
 @dataclass(frozen=True)
@@ -108,4 +111,5 @@ def _checked(model: IdentifiedModel, test: FrequencyResponse, design: Design | N
         between_lines=reach_between_lines(model, sweep),
         moves=None if model.fit is None else moves(model, model.fit, sweep, share),
         design=None if design is None else on_plant(design, sweep.fit.plant),
+        more_left=sweep.fit.misfit > 0 and model.fit is not None and not any(model.fit.misfit),
     )

@@ -27,7 +27,9 @@ def junit(found: ModelCheck) -> str:
     root = Element("testsuites", {"name": SUITE, **{k: numbers[k] for k in ("tests", "failures", "errors")}})
     suite = SubElement(root, "testsuite", {"name": SUITE, **numbers})
     for each in given:
-        case = SubElement(suite, "testcase", {"name": each.question, "classname": printable(each.sweep)})
+        case = SubElement(
+            suite, "testcase", {"name": printable(f"{each.sweep}: {each.question}"), "classname": "check"}
+        )
         sentence = printable(each.sentence)
         if each.outcome is Outcome.MOVED:
             SubElement(case, "failure", {"message": sentence, "type": each.question}).text = sentence

@@ -10,12 +10,12 @@ import numpy as np
 from identification.base.arrays import Real
 from identification.base.errors import InputError
 from identification.fitting.one_fit import OneFit
-from identification.fitting.same_structure import fit_same_structure
+from identification.fitting.same_structure import deviance_of, fit_same_structure
 from identification.fitting.single_test_fit import Misfit, Undetermined
 from identification.fitting.small_sample import Sureness, sureness
 from identification.model.model_file import IdentifiedModel
 from identification.model.structure import Structure
-from identification.sweeps.joined_bands import joined_bands
+from identification.sweeps.joined_bands import SHARE, joined_bands
 from identification.sweeps.noise_lines import only, without_noise
 from identification.sweeps.response import FrequencyResponse, alias_free, conjugated
 
@@ -34,11 +34,14 @@ class NewSweep:
         Its likeliest plant.
     sure
         How sure that is.
+    gained
+        By how much likelier it is than the model's plant: twice the logarithm of the ratio.
     """
 
     test: FrequencyResponse
     fit: OneFit
     sure: Sureness
+    gained: float
 
     @property
     def noise(self) -> Real:
@@ -65,26 +68,42 @@ def lines_to_check(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -
     Raises
     ------
     InputError
-        Every line of a sweep is noise, or none lies within the band.
+        Every line of a sweep is noise, none lies within the band, or the sweeps hold too little of it.
+
+    Notes
+    -----
+    As in a fit, sweeps of different bands are taken together, and less than SHARE of a band tells no plant.
     """
     record = model.fit
     if record is not None and record.conjugated:
         tests = [conjugated(test) for test in tests]
     used = without_noise(tests)
-    if record is not None:
-        used = [_within(test, *record.band) for test in used]
-    return joined_bands(used)
+    if record is None:
+        return joined_bands(used)
+    low, high = record.band
+    used = joined_bands([_within(test, low, high) for test in used])
+    for test in used:
+        first, last = test.omega[[0, -1]]
+        if np.log(last / first) < SHARE * np.log(high / low):
+            raise InputError(
+                f"{test.name}: has lines from {_hz(first)} to {_hz(last)} Hz; expected {100 * SHARE:.0f} % or more of "
+                f"the decades from {_hz(low)} to {_hz(high)} Hz, where the model was measured"
+            )
+    return used
 
 
 def _within(test: FrequencyResponse, low: float, high: float) -> FrequencyResponse:
     kept = (test.omega >= low * (1 - EDGE)) & (test.omega <= high * (1 + EDGE))
     if not kept.any():
-        (first, last), band = test.omega[[0, -1]] / (2 * np.pi), (low / (2 * np.pi), high / (2 * np.pi))
         raise InputError(
-            f"{test.name}: has lines from {first:.6g} to {last:.6g} Hz; expected some from {band[0]:.6g} to "
-            f"{band[1]:.6g} Hz, where the model was measured"
+            f"{test.name}: has lines from {_hz(test.omega[0])} to {_hz(test.omega[-1])} Hz; expected some from "
+            f"{_hz(low)} to {_hz(high)} Hz, where the model was measured"
         )
     return only(test, kept, "outside the band of the model")
+
+
+def _hz(omega: float) -> str:
+    return f"{omega / (2 * np.pi):.6g}"
 
 
 def fitted(model: IdentifiedModel, test: FrequencyResponse) -> NewSweep | str:
@@ -108,9 +127,9 @@ def fitted(model: IdentifiedModel, test: FrequencyResponse) -> NewSweep | str:
     except Misfit as error:
         return str(error)
     except Undetermined:
-        low, high = test.omega[[0, -1]] / (2 * np.pi)
         raise InputError(
-            f"{test.name}: its {test.omega.size} lines from {low:.6g} to {high:.6g} Hz do not determine a plant with "
-            f"{structure}; expected lines wherever the model was measured"
+            f"{test.name}: its {test.omega.size} lines from {_hz(test.omega[0])} to {_hz(test.omega[-1])} Hz do not "
+            f"determine a plant with {structure}; expected lines where its modes show"
         ) from None
-    return NewSweep(alias_free(test, fit.plant), fit, sureness(fit, test))
+    gained = deviance_of(test, structure, model.plant, soft=soft) - fit.deviance
+    return NewSweep(alias_free(test, fit.plant), fit, sureness(fit, test), gained)

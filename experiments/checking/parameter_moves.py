@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtr, stdtrit
+from scipy.special import chdtrc, stdtr, stdtrit
 
 from experiments.checking.new_sweep import NewSweep
 from identification.base.arrays import Real
@@ -31,7 +31,8 @@ class Move:
         The difference over its standard error: of logarithms, but for the dead time; infinite where the gain has
         changed its sign.
     chance
-        Probability of a difference as large where nothing moved, times the number of parameters (Bonferroni), or 1.
+        Probability of a difference as large where nothing moved, times the number of parameters (Bonferroni), or 1; at
+        least that with which the whole plant's likelihood gains as much by chance.
     found_from
         Relative move from which it would have been found; of a dead time that the model has not, in seconds.
     """
@@ -72,7 +73,8 @@ def moves(model: IdentifiedModel, record: FitRecord, sweep: NewSweep, level: flo
     the model's tests differ by more than their noise, so will a new one: by their standard deviation s, and from their
     mean of n by (1 + 1/n) s^2, and by more where the new sweep is noisier than they were. The sum is compared by
     Student's distribution with Welch's degrees of freedom. The model's noise is taken to be as well known as that of
-    as many sweeps like the new one as it has tests.
+    as many sweeps like the new one as it has tests. No parameter moved where the sweep is as likely with the model's
+    plant as with its own fit: of what it hardly shows, such as a zero beside a pole, that fit may be anywhere.
     """
     structure, fit, sure = sweep.fit.structure, sweep.fit, sweep.sure
     count, size = len(record.tests), structure.free
@@ -95,7 +97,8 @@ def moves(model: IdentifiedModel, record: FitRecord, sweep: NewSweep, level: flo
     errors = (after - before) / np.sqrt(variance)
     if fit.sign != np.sign(model.plant.gain):
         errors[0] = np.inf
-    chance = np.minimum(1.0, size * 2 * stdtr(freedom, -np.abs(errors)))
+    alike = chdtrc(size, max(0.0, sweep.gained))
+    chance = np.minimum(1.0, np.maximum(size * 2 * stdtr(freedom, -np.abs(errors)), alike))
     seen = stdtrit(freedom, 1 - level / (2 * size)) * np.sqrt(variance)
     return tuple(
         Move(parameter, value, float(errors[k]), float(chance[k]), _share(seen, k, parameter))

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 from math import inf, isinf, pi
 
 from design.stability.margins import Margins
-from experiments.checking.answers import Outcome, answers, relative
+from experiments.checking.answers import Outcome, answers, answers_of_sweep, relative
 from experiments.checking.check_model import ModelCheck, SweepCheck
+from experiments.checking.new_sweep import NewSweep
 from experiments.checking.parameter_moves import Move
 
 HEAD = ("parameter", "model", "sweep", "moved", "standard errors", "found from")
@@ -16,31 +17,23 @@ HEAD = ("parameter", "model", "sweep", "moved", "standard errors", "found from")
 def first_sentence(found: ModelCheck) -> str:
     """What to do and why, in one sentence without its full stop."""
     given = answers(found)
-    moved = [each for each in given if each.outcome is Outcome.MOVED]
-    several = len(found.sweeps) > 1
+    moved: dict[str, str] = {}  # of each question that of the first sweep
+    for each in given:
+        if each.outcome is Outcome.MOVED:
+            moved.setdefault(each.question, each.sentence + (f" ({each.sweep})" if len(found.sweeps) > 1 else ""))
+    held = {each.question for each in given if each.outcome is Outcome.HOLDS} - moved.keys()
     if not moved:
-        held = {each.question for each in given if each.outcome is Outcome.HOLDS}
-        said = "every sweep lies within W_a" if several else "the sweep lies within W_a"
-        parts = [said, *(["no parameter moved"] if "parameters" in held else [])]
-        untold = [each.question for each in given if each.outcome is Outcome.OPEN]
-        rest = f"; not told: {', '.join(dict.fromkeys(untold))}" if untold else ""
-        return f"Nothing to do: {', '.join([*parts, *_design_keeps(held)])}{rest}"
-    first = {each.question: each for each in reversed(moved)}  # of each question that of the first sweep
-    reasons = [
-        f"{each.sentence}{f' ({each.sweep})' if several else ''}" for each in moved if each is first[each.question]
-    ]
-    stable = not any("NOT stable" in each.sentence for each in moved)
-    keeps = {each.question for each in given if each.question not in first and each.outcome is Outcome.HOLDS}
-    reasons += _design_keeps(keeps)
-    if not stable:
+        reasons = ["every sweep lies within W_a" if len(found.sweeps) > 1 else "the sweep lies within W_a"]
+        reasons += ["no parameter moved"] if "parameters" in held else []
+        untold = dict.fromkeys(each.question for each in given if each.outcome is Outcome.OPEN)
+        rest = f"; not told: {', '.join(untold)}" if untold else ""
+        return f"Nothing to do: {', '.join([*reasons, *_design_keeps(held)])}{rest}"
+    todo = "Fit a new model and design again" if moved.keys() & {"margins", "guarantee"} else "Fit a new model"
+    if any(sweep.design is not None and sweep.design.sector is None for sweep in found.sweeps):
         todo = "Do not run this design"
-    elif first.keys() & {"margins", "guarantee"}:
-        todo = "Fit a new model and design again"
-    else:
-        todo = "Fit a new model"
-    if found.promise is None:
-        reasons.append("whether a design of it may stay, --against says")
-    return f"{todo}: {'; '.join(reasons)}"
+        moved.pop("guarantee", None)  # there is none without a stable loop
+    after = [*_design_keeps(held), *(["whether a design may stay, --against says"] if found.promise is None else [])]
+    return f"{todo}: {'; '.join([*moved.values(), *after])}"
 
 
 def _design_keeps(held: set[str]) -> list[str]:
@@ -50,14 +43,11 @@ def _design_keeps(held: set[str]) -> list[str]:
 
 def text(found: ModelCheck) -> str:
     """All that a check found, as a terminal shows it."""
-    given = answers(found)
     lines = [first_sentence(found)]
     for sweep in found.sweeps:
         lines += ["", describe(sweep)]
         lines += [
-            f"  {each.question:<12}{each.outcome.value:<10}{each.sentence}"
-            for each in given
-            if each.sweep == sweep.name
+            f"  {each.question:<12}{each.outcome.value:<10}{each.sentence}" for each in answers_of_sweep(found, sweep)
         ]
         for table in tables(found, sweep):
             lines += ["", *_columns(table)]
@@ -65,9 +55,16 @@ def text(found: ModelCheck) -> str:
 
 
 def describe(sweep: SweepCheck) -> str:
-    """A sweep in a line: its name, and which lines of it were compared."""
+    """A sweep: its name, which lines of it were compared, and what the model's structure leaves in it anew."""
     low, high = (f"{omega / (2 * pi):.4g}" for omega in sweep.band)
-    return f"{sweep.name}: {sweep.lines} lines from {low} to {high} Hz"
+    said = f"{sweep.name}: {sweep.lines} lines from {low} to {high} Hz"
+    if sweep.more_left and isinstance(sweep.sweep, NewSweep):
+        fit = sweep.sweep.fit
+        said += (
+            f"; neighbouring residuals correlate by {fit.correlation:.2f}, as none of the model's tests did: look at "
+            f"what is new, near {fit.worst_omega / (2 * pi):.4g} Hz"
+        )
+    return said
 
 
 def tables(found: ModelCheck, sweep: SweepCheck) -> list[list[tuple[str, ...]]]:

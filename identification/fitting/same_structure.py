@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from identification.fitting.grouped_lines import grouped
-from identification.fitting.likelihood import Likely
+from identification.fitting.least_squares import response_of
+from identification.fitting.likelihood import Likely, noise_levels
 from identification.fitting.one_fit import OneFit
 from identification.fitting.single_test_fit import SAME, ScaledTest
 from identification.model.plant import PlantModel
@@ -48,3 +49,12 @@ def fit_same_structure(test: FrequencyResponse, structure: Structure, near: Plan
         return few.finish(found)
     whole = ScaledTest(test, soft)
     return whole.finish(whole.taken_over(few, found))
+
+
+def deviance_of(test: FrequencyResponse, structure: Structure, plant: PlantModel, *, soft: bool) -> float:
+    """-2 log likelihood of a test if a plant of the structure were the true one, comparable with that of its fit."""
+    scaled = ScaledTest(test, soft)
+    theta, sign = scaled.to_scaled(structure, structure.theta(plant)), float(np.sign(plant.gain))
+    model = sign * response_of(structure, theta, scaled.omega)
+    error = np.abs(scaled.lines.response - scaled.lines.aliases(structure, theta, sign) - model) ** 2
+    return noise_levels(error, np.abs(model) ** 2, scaled.lines.excitation, soft)[2]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import socket
+import sys
 from dataclasses import replace
 from pathlib import Path
 from urllib.parse import parse_qs
@@ -272,3 +273,29 @@ def test_a_command_that_cannot_serve_says_why(
         )
     assert result.exit_code == 2
     assert said in result.output
+
+
+def test_without_its_extra_the_command_says_what_to_install(
+    extended_design: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "design.json").write_text(extended_design.to_json(), encoding="utf-8")
+
+    class Missing:
+        """A finder to which Bokeh is not installed."""
+
+        @staticmethod
+        def find_spec(name: str, _path: object = None, _target: object = None) -> None:
+            if name == "bokeh":
+                raise ModuleNotFoundError("No module named 'bokeh'", name=name)
+
+    ours = [f"paper_figures.explore.{name}" for name in ("server", "page", "pictures")]
+    for name in [*ours, *(name for name in sys.modules if name.partition(".")[0] == "bokeh")]:
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.setattr(sys, "meta_path", [Missing, *sys.meta_path])
+    with socket.create_server(("127.0.0.1", 0)) as taken:  # so that it ends in any case
+        port = str(taken.getsockname()[1])
+        refused = CliRunner().invoke(main, ["explore", str(tmp_path / "design.json"), "--no-browser", "--port", port])
+    assert refused.exit_code == 2
+    assert refused.stderr == (
+        'Error: bokeh is not installed, which this command needs; give pip install "antiwindup-thesis[explore]"\n'
+    )
