@@ -114,7 +114,7 @@ def test_the_run_is_that_of_simulate_with_the_true_plant(extended_design: Design
     )
     np.testing.assert_allclose(run.control, expected.control, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(run.outputs["output"], expected.outputs["output"], rtol=1e-9, atol=1e-9)
-    assert "gain times 1.3, the frequencies of its modes times 0.9, a dead time of 0.02 s instead of 0.0081 s" in (
+    assert "gain times 1.3 and the frequencies of its modes times 0.9 and a dead time of 0.02 s instead of 0.0081 s" in (
         true_plant_text(state.true, explorer.start.true)
     )
 
