@@ -24,7 +24,7 @@ BENCH_READY := .venv/.bench-ready
 AUDIT_READY := .venv/.audit-ready
 
 # Values go to Python by the environment, as they were given: neither make nor the shell reads a name in them.
-GIVEN := SWEEPS MODEL FIT LIMIT PLANTS JOBS ONLY REPORT FORCE BUILD OUT SETS CASES SEED TIMES
+GIVEN := SWEEPS MODEL FIT AXIS LIMIT PLANTS JOBS ONLY FORCE BUILD OUT SETS CASES SEED TIMES
 unexport $(GIVEN)
 define hand
 export ANTIWINDUP_$(1) := $$(value $(1))
@@ -40,7 +40,8 @@ help: ## say what there is
 	@echo 'make figures MODEL=implied    redraw for the thesis'"'"'s own set (or table, or a model.json); ONLY=fig_2_01'
 	@echo 'make refit SWEEPS="a.csv b.mat folder" OUT=mine    from your own sweeps to mine/summary.pdf and mine/figures'
 	@echo 'make refit ... FIT="--modes 1 --bound-order 3"    with options of python -m identification fit'
-	@echo 'make refit ... LIMIT=5    under other saturation limits than the thesis'"'"'s; REPORT=yes for the report too'
+	@echo 'make refit ... AXIS=axis.toml    for your axis: .venv/bin/antiwindup new axis.toml writes the file to fill in'
+	@echo 'make refit ... LIMIT="-3 12"    the saturation limits alone; LIMIT=5 for +-5, with make figures too'
 	@echo 'make ... PLANTS=10000    as many plants drawn within W_a, 200 otherwise (Fig. A.6); JOBS=1 one step at a time'
 	@echo 'make ... FORCE=yes    replace files of yours that stand in the place of an output'
 figures: $(READY) ## draw the thesis's figures and A.1 to A.9 into build/figures

@@ -13,8 +13,8 @@ import click
 
 from identification.base.command_line import CommandGroup
 
-COMMANDS = dict.fromkeys(("refit", "figures", "report"), "commands")
-COMMANDS |= {name: f"{name}_command" for name in ("export", "explore")}
+COMMANDS = {"new": "new_command"} | dict.fromkeys(("refit", "figures", "report"), "commands")
+COMMANDS |= {name: f"{name}_command" for name in ("export", "check", "explore")}
 """Command of this package -> its module."""
 ROOMS = ("identification", "design", "experiments", "paper_figures")
 

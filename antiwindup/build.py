@@ -34,6 +34,7 @@ class Crash(Exception):
 @dataclass(frozen=True)
 class _Running:
     step: Step
+    stage: int
     source: str
     process: BaseProcess
     log: Path
@@ -78,6 +79,7 @@ class Build:
     printed: dict[str, str] = field(default_factory=dict)
     refused: dict[str, str] = field(default_factory=dict)
     _running: dict[int, _Running] = field(default_factory=dict)
+    _untouched: set[Step] = field(default_factory=set)
 
     @cached_property
     def needed(self) -> list[Step]:
@@ -88,6 +90,11 @@ class Build:
                 found.append(step)
                 read |= {*step.needs, *step.uses}
         return found[::-1]
+
+    @property
+    def runs(self) -> int:
+        """How often a step that is needed is looked at: once, and once for each of its stages."""
+        return sum(1 + len(step.stages) for step in self.needed)
 
     def run(self, tell: Tell) -> None:
         """Bring the files up to date.
@@ -120,35 +127,45 @@ class Build:
                     running.closing.close()
                 self._folder.save()
 
-    def _ended(self) -> Iterator[Step]:
-        """The steps as they end."""
+    def _ended(self) -> Iterator[tuple[Step, int]]:
+        """The steps as they end, with the number of the stage."""
         steps = self.needed
         makers = {output: step for step in steps for output in (*step.outputs, step.refusal)}
-        sorter = TopologicalSorter(
-            {step: {makers[path] for path in (*step.needs, *step.uses) if path in makers} for step in steps}
-        )
+        sorter = TopologicalSorter[tuple[Step, int]]()  # a run is a step and the number of its stage
+        for step in steps:
+            for stage, files in enumerate((*step.stages, step.uses)):
+                made_before = {makers[path] for path in (*step.needs, *files) if path in makers}
+                runs_before = [(maker, len(maker.stages)) for maker in made_before]
+                sorter.add((step, stage), *runs_before, *([(step, stage - 1)] if stage else []))
         sorter.prepare()
-        waiting: list[Step] = []
+        self._untouched = {*steps}
+        waiting: list[tuple[Step, int]] = []
         while sorter.is_active():
-            waiting = sorted([*waiting, *sorter.get_ready()], key=steps.index)
+            waiting = sorted([*waiting, *sorter.get_ready()], key=lambda run: (_is_last(*run), steps.index(run[0])))
             ended = []
             while waiting and len(self._running) < self.jobs:
-                if self._settled(step := waiting.pop(0)):
-                    ended.append(step)
+                if self._settled(*(run := waiting.pop(0))):
+                    ended.append(run)
             if not ended:
                 ended = [self._settle(self._running.pop(number)) for number in wait(list(self._running))]  # type: ignore[arg-type]
-            for step in ended:
-                sorter.done(step)
-                yield step
+            for run in ended:
+                sorter.done(run)
+                yield run
 
-    def _settled(self, step: Step) -> bool:
-        """Whether nothing is to be done for a step; if something is, it is started."""
+    def _settled(self, step: Step, stage: int) -> bool:
+        """Whether nothing is to be done for a step in a stage; if something is, it is started."""
         folder = self._folder
+        self._untouched.discard(step)
         if any(folder.content(path) is None for path in step.needs):
             self._remove([step])
             return True
-        if folder.holds(source := self._source(step), step.outputs):
+        if folder.holds(self._source(step), step.outputs):
             return True
+        if not _is_last(step, stage):  # what an earlier build left of other inputs must not stand beside the new
+            for other in self.needed:
+                if other in self._untouched and not folder.holds(self._source(other), other.outputs):
+                    self._remove([other])
+        source = self._source(step)
         if not self.force:
             folder.require_free(step.outputs)  # as they are by now
         folder.begin(source, step.outputs)
@@ -159,10 +176,10 @@ class Build:
             log = stack.enter_context(partial_file(self.path, ".log"))
             process = start(step.command, log, folder.journal)
             closing = stack.pop_all()
-        self._running[process.sentinel] = _Running(step, source, process, log, closing)
+        self._running[process.sentinel] = _Running(step, stage, source, process, log, closing)
         return False
 
-    def _settle(self, ended: _Running) -> Step:
+    def _settle(self, ended: _Running) -> tuple[Step, int]:
         """Note how a step ended."""
         step, folder = ended.step, self._folder
         ended.process.join()
@@ -176,7 +193,7 @@ class Build:
             folder.end(step.outputs)
             folder.remove([step.refusal])
             self.printed[step.name] = said
-            return step
+            return step, ended.stage
         *before, sentence = said.strip().splitlines() or [""]
         is_refusal = (
             ended.process.exitcode == 2
@@ -199,7 +216,7 @@ class Build:
         write_whole({step.refusal: lambda path: path.write_text(f"{sentence}\n", encoding="utf-8")})
         note(folder.journal, {step.refusal: step.refusal})
         folder.end([step.refusal])
-        return step
+        return step, ended.stage
 
     def _source(self, step: Step) -> str:
         """The hash of all that decides on what a step writes."""
@@ -217,6 +234,10 @@ class Build:
                 found.append(step)
                 written |= {*step.outputs, step.refusal}
         return found
+
+
+def _is_last(step: Step, stage: int) -> bool:
+    return stage == len(step.stages)
 
 
 def _signature(path: Path) -> tuple[int, int, int] | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,11 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from identification.__main__ import fit_options, reading_options
+from experiments.axis_command import axis_options, given_keys
+from experiments.pair_options import PairCommand
+from identification.__main__ import fit_options, reading_options, signal_options
+from identification.base.axis_file import KEYS, require_consistent
+from identification.base.axis_option import words_of
 from identification.base.command_line import together
 from identification.base.errors import InputError, shown
 from identification.base.files import require_readable, true_path
@@ -24,10 +29,10 @@ if TYPE_CHECKING:
     from antiwindup.steps import Asked, Step
 
 SWEEPS = click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True)
+LIMIT = click.option("--limit", type=float, help="Saturation limits +-LIMIT, instead of the thesis's.")
 MODEL = click.option("--model", help="A model.json, or table or implied: what to draw instead of a fit of SWEEP.")
 build_options = together(
     click.option("--output", required=True, help="Folder to write to."),
-    click.option("--limit", type=float, help="Saturation limits +-LIMIT, instead of the thesis's."),
     click.option("--plants", type=click.IntRange(1), default=200, help="Drawn within W_a (Fig. A.6)."),
     click.option("--jobs", type=click.IntRange(1), help="How many steps run at once; one a processor unless given."),
     click.option("--force", is_flag=True, help="Replace what stands in the place of an output, whoever wrote it."),
@@ -37,32 +42,45 @@ build_options = together(
 """What every build takes."""
 
 
-@click.command("refit")
+@click.command("refit", cls=PairCommand)
 @SWEEPS
-@click.option("--report", is_flag=True, help="Make report/index.html too, with the verdicts on the thesis.")
+@axis_options
+@signal_options
 @build_options
-def refit(sweeps: tuple[str, ...], report: bool, **options: Any) -> None:
-    """Fit SWEEP files, design, simulate, draw and sum up for that plant.
+def refit(sweeps: tuple[str, ...], **options: Any) -> None:
+    """Fit SWEEP files, design for your axis, simulate, draw and sum up.
+
+    What you know of the axis stands in the file of --axis, which `antiwindup new` writes, or in options of the same
+    names. Without, a reference is chosen that the plant can follow with 80 % of the limits.
 
     A second run does what has changed since, and nothing of yours is replaced or removed. Designs and simulations that
     refuse the plant stop only what needs them.
     """
-    from antiwindup.steps import refit_steps, report_steps
+    from antiwindup.refit_steps import refit_steps
 
+    of_axis = {name: options.pop(name) for name in list(options) if name.replace("_", "-") in KEYS}
+    given = given_keys({name: value for name, value in of_axis.items() if _is_given(name)})
+    require_consistent(given)
+    names = {name: value for name, value in given.items() if name.endswith(("-name", "-unit"))}
+    axis = tuple(words_of({name: value for name, value in given.items() if name not in names}))
+    files = tuple(Path(given[name]) for name in ("reference",) if name in given)
+    for path in files:
+        require_readable(path)
     asked, how = _asked(sweeps, None, **options)
+    asked = replace(asked, fit=(*asked.fit, *words_of(names)), axis=axis, axis_files=files)
     steps = refit_steps(asked)
-    after = report_steps(asked, steps)
-    _build(asked, [*steps, *after], [*steps, *(after if report else [])], goes_on=True, **how)
+    _build(asked, steps, steps, goes_on=True, **how)
 
 
 @click.command("figures")
 @SWEEPS
 @MODEL
 @click.option("--only", metavar="FIGURE", multiple=True, help="Such as fig_2_01; all unless given.")
+@LIMIT
 @build_options
 def figures(sweeps: tuple[str, ...], model: str | None, only: tuple[str, ...], **options: Any) -> None:
     """Draw the figures of the thesis, and ours, from SWEEP files."""
-    from antiwindup.steps import report_steps, thesis_steps
+    from antiwindup.thesis_steps import report_steps, thesis_steps
 
     asked, how = _asked(sweeps, model, **options)
     steps = thesis_steps(asked)
@@ -76,10 +94,11 @@ def figures(sweeps: tuple[str, ...], model: str | None, only: tuple[str, ...], *
 @click.command("report")
 @SWEEPS
 @MODEL
+@LIMIT
 @build_options
 def report(sweeps: tuple[str, ...], model: str | None, **options: Any) -> None:
     """Put the figures with their data, every verdict on the thesis, the fit and the audits on one page of HTML."""
-    from antiwindup.steps import report_steps, thesis_steps
+    from antiwindup.thesis_steps import report_steps, thesis_steps
 
     asked, how = _asked(sweeps, model, **options)
     steps = thesis_steps(asked)
@@ -91,10 +110,10 @@ def _asked(
     sweeps: tuple[str, ...],
     model: str | None,
     output: str,
-    limit: float | None,
     plants: int,
     jobs: int | None,
     force: bool,
+    limit: float | None = None,
     **fit: Any,
 ) -> tuple[Asked, dict[str, Any]]:
     """What a build is for, with files that are there; and how it is run."""
@@ -109,15 +128,21 @@ def _asked(
     for name in (*sweeps, *([model] if model else ()), output):
         if "\n" in name:
             raise InputError(f"{shown(name)}: holds a line break; expected a name of one line")
-    source = click.get_current_context().get_parameter_source
-    given = {name: value for name, value in fit.items() if source(name) == ParameterSource.COMMANDLINE}
+    given = {name: value for name, value in fit.items() if _is_given(name)}
     words = [word for name, value in given.items() for word in _words(name, value)]
-    asked = Asked(Path(output), model, sweeps, tuple(input_files(sweeps)), tuple(words), limit, plants)
+    files = tuple(input_files(sweeps))
+    asked = Asked(Path(output), model, sweeps, files, fit=tuple(words), limit=limit, plants=plants)
     for path in asked.sweep_files:
         require_readable(path)
     if model is not None:
         asked_model(model)
     return asked, {"jobs": jobs or os.cpu_count() or 1, "force": force}
+
+
+def _is_given(name: str) -> bool:
+    """Whether an option of this command stands on the command line or in the file of --axis."""
+    source = click.get_current_context().get_parameter_source(name)
+    return source in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP)
 
 
 def _words(name: str, value: object) -> list[str]:
@@ -140,13 +165,14 @@ def _build(asked: Asked, steps: Sequence[Step], wanted: Sequence[Step], goes_on:
 
     from antiwindup.build import Build, Crash
 
-    inputs = (*asked.sweep_files, *(asked.model_files if asked.model else ()))
+    inputs = (*asked.sweep_files, *(asked.model_files if asked.model else ()), *asked.axis_files)
     build = Build(asked.folder, steps, inputs, wanted, goes_on, jobs, force)
-    with tqdm(total=len(build.needed), unit="", disable=None, leave=False) as bar:
+    with tqdm(bar_format="{desc}", disable=None, leave=False) as bar:
 
         def tell(ended: int, running: Sequence[str]) -> None:
-            bar.set_description(", ".join(running), refresh=False)
-            bar.update(ended - bar.n)
+            bar.set_description_str(f"step {min(ended + 1, build.runs)} of {build.runs}: {', '.join(running)}")
+
+        tell(0, [step.name for step in build.needed[:1]])
 
         try:
             build.run(tell)

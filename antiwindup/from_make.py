@@ -33,22 +33,23 @@ def arguments(build: str, variables: Mapping[str, str]) -> list[str]:
     build
         refit, figures or report.
     variables
-        SWEEPS, names as :func:`words` reads them; FIT, options; ONLY, figures; REPORT, yes or nothing; and OUTPUT,
-        MODEL, LIMIT, PLANTS, JOBS, values as they are. What is missing or empty is not given, but for OUTPUT.
+        SWEEPS, names as :func:`words` reads them; FIT, options; ONLY, figures; FORCE, yes or nothing; and OUTPUT,
+        MODEL, AXIS, LIMIT, PLANTS, JOBS, values as they are. What is missing or empty is not given, but for OUTPUT.
 
     Raises
     ------
     InputError
-        A quote in FIT or SWEEPS has no end, FIT holds what is no option of the fit, or FORCE or REPORT another word.
+        A quote in FIT or SWEEPS has no end, FIT holds what is no option of the fit, or FORCE another word.
     """
     given = {name: value for name, value in variables.items() if value}
     options = [f"--output={variables['OUTPUT']}"]
-    options += [f"--{name.lower()}={given[name]}" for name in ("MODEL", "LIMIT", "PLANTS", "JOBS") if name in given]
+    options += [
+        f"--{name.lower()}={given[name]}" for name in ("MODEL", "AXIS", "LIMIT", "PLANTS", "JOBS") if name in given
+    ]
     options += [f"--only={name}" for name in given.get("ONLY", "").split()]
-    for name in ("REPORT", "FORCE"):
-        if given.get(name, "yes") != "yes":
-            raise InputError(f"{name} is {shown(given[name])}; expected yes or nothing")
-        options += [f"--{name.lower()}"] if name in given else []
+    if given.get("FORCE", "yes") != "yes":
+        raise InputError(f"FORCE is {shown(given['FORCE'])}; expected yes or nothing")
+    options += ["--force"] if "FORCE" in given else []
     fit = _split("FIT", given.get("FIT", ""))
     try:
         only_fit.make_context("FIT", list(fit), resilient_parsing=False)

@@ -36,6 +36,7 @@ class OutputFolder:
 
     def __init__(self, path: Path) -> None:
         self.path, self.journal, self._contents = path, path / JOURNAL, dict[Path, str | None]()
+        self._begun = set[Path]()
         self.written = read_manifest(path)
         noted = read_journal(self.journal)
         for name, written in list(self.written.items()):
@@ -51,6 +52,8 @@ class OutputFolder:
 
     def content(self, path: Path) -> str | None:
         """The SHA-256 of any file, None if it is not there."""
+        if path in self._begun:
+            return content_of(path)
         if path not in self._contents:
             self._contents[path] = content_of(path)
         return self._contents[path]
@@ -95,6 +98,7 @@ class OutputFolder:
             except OSError as error:
                 raise InputError(f"{path}: cannot be written ({error.strerror})") from None
             self.written[self.name(path)] = Written(source, None)
+            self._begun.add(path)
             self._contents.pop(path, None)
         write_manifest(self.path, self.written)
 
@@ -102,6 +106,7 @@ class OutputFolder:
         """Note what the files that were begun hold."""
         for path in paths:
             name = self.name(path)
+            self._begun.discard(path)
             self.written[name] = Written(self.written[name].source, self.content(path))
 
     def remove(self, paths: Iterable[Path]) -> None:
@@ -122,6 +127,7 @@ class OutputFolder:
             except OSError as error:
                 raise InputError(f"{path}: cannot be removed ({error.strerror})") from None
             self.written.pop(self.name(path), None)
+            self._begun.discard(path)
             self._contents.pop(path, None)
 
     def save(self) -> None:

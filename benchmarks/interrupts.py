@@ -40,6 +40,8 @@ COMMANDS = {
         *["--epsilon", "1e-4", "--output", "{folder}/d.json"],
     ],
     "audit": ["design", "audit", "{extended}"],
+    "new": ["antiwindup", "new", "{folder}/axis.toml"],
+    "axis": ["experiments", "axis", "implied", "--reference-hz", "0.5", "--output", "{folder}"],
     "simulate": [
         *["experiments", "simulate", *RUN, "--until", "9000", "--sample-time", "0.01", "--output", "{folder}/r.csv"],
     ],
@@ -67,6 +69,7 @@ COMMANDS = {
 }  # fmt: skip
 FILES = {
     "fit": 2,
+    "axis": 2,
     "limits": 2,
     "compare": 2,
     "interpolation": 3,

@@ -15,6 +15,7 @@ from typing import Any
 
 import click
 
+from experiments.axis_command import axis_command
 from experiments.campaign.command import campaign_command
 from experiments.options import DESIGN, OUTPUT_FOLDER, asked_limits, sinusoid_options
 from experiments.pair_options import NumberPair, PairCommand
@@ -22,6 +23,7 @@ from experiments.run_commands import sampled_command, simulate_command
 from experiments.table_commands import rates_command, tracking_command
 from experiments.tables import write_into
 from experiments.thesis.commands import thesis
+from identification.base.axis_option import AXIS
 from identification.base.command_line import CommandGroup
 from identification.base.path_types import INPUT_FILE
 
@@ -43,6 +45,7 @@ def main() -> None:
     """Simulate saturated loops, their dead time exact."""
 
 
+main.add_command(axis_command)
 main.add_command(simulate_command)
 main.add_command(sampled_command)
 main.add_command(tracking_command)
@@ -63,6 +66,7 @@ def campaign_distributions(campaign: Path, output: Path) -> None:
 
 @main.command("limits", cls=PairCommand)
 @DESIGN
+@AXIS
 @click.option(
     "--limit",
     "limits",
@@ -90,6 +94,7 @@ def limits(design: Path, limits: tuple[tuple[float, ...], ...], output: Path, **
 
 @main.command("compare", cls=PairCommand)
 @DESIGN
+@AXIS
 @click.option(
     "--limit",
     type=NumberPair(),

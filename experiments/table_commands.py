@@ -11,6 +11,7 @@ import click
 from experiments.options import DESIGN, LIMIT_PAIR, OUTPUT_FOLDER, asked_limits, reference_options, sinusoid_options
 from experiments.pair_options import PairCommand
 from experiments.tables import write_into
+from identification.base.axis_option import AXIS
 
 RATE_LIMIT = click.option(
     "--rate-limit",
@@ -22,6 +23,7 @@ RATE_LIMIT = click.option(
 
 @click.command("tracking", cls=PairCommand)
 @DESIGN
+@AXIS
 @LIMIT_PAIR
 @reference_options
 @RATE_LIMIT
@@ -39,6 +41,7 @@ def tracking_command(design: Path, limit: tuple[float, ...], rate_limit: float, 
 
 @click.command("rates", cls=PairCommand)
 @DESIGN
+@AXIS
 @LIMIT_PAIR
 @sinusoid_options
 @RATE_LIMIT

@@ -17,6 +17,7 @@ from typing import Any
 
 import click
 
+from identification.base.axis_option import AXIS
 from identification.base.command_line import CommandGroup, together
 from identification.base.files import require_writable, write_whole
 from identification.base.path_types import FIGURE_FILE, INPUT, OUTPUT_FILE
@@ -156,6 +157,7 @@ signal_options = together(
 
 @main.command()
 @click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)
+@AXIS
 @click.option("--output", required=True, type=OUTPUT_FILE, help="The model.json to write.")
 @click.option(
     "--responses",

@@ -18,6 +18,7 @@ import pyarrow
 from benchmarks.fuzz import seeds
 from benchmarks.fuzz.mutations import NUMBERS, WORDS, changed
 from benchmarks.fuzz.outcome import ROOMS
+from identification.base.axis_file import KEYS
 from paper_figures.thesis.figure_registry import figure_module, figure_names
 
 
@@ -194,6 +195,21 @@ def campaigns(rng: random.Random, cheap: bool) -> Case:
     return Case(
         ("experiments", "campaign-tables", "campaign.parquet", "--output", "out"), {"campaign.parquet": damaged}
     )
+
+
+def axes(rng: random.Random, cheap: bool) -> Case:
+    """A damaged axis.toml: its bytes, or a line with an odd value."""
+    lines = [f"{name} = {key.example}" for name, key in KEYS.items() if name != "reference"]
+    if rng.random() < 0.5:
+        name = rng.choice(sorted(KEYS))
+        lines.append(f"{name} = {rng.choice((*NUMBERS, *WORDS, '[]', '[1, 2]', '[[1]]', '{a = 1}', '1979-05-27'))}")
+    content = "\n".join(rng.sample(lines, rng.randrange(1, len(lines)))).encode("utf-8", "replace")
+    if rng.random() < 0.5:
+        content = changed(content, ".toml", rng)
+    commands: list[tuple[str, ...]] = [("readers", "axis", "axis.toml")]
+    if not cheap:
+        commands += [("experiments", "axis", "model.json", "--axis", "axis.toml", "--output", "out")]
+    return Case(rng.choice(commands), {"axis.toml": content, **seeds.models()})
 
 
 def options(rng: random.Random, cheap: bool) -> Case:
@@ -374,6 +390,7 @@ KINDS: dict[str, Maker] = {
     "designs": designs,
     "tables": tables,
     "campaigns": campaigns,
+    "axes": axes,
     "options": options,
     "paths": paths,
 }

@@ -10,6 +10,7 @@ from design.design_file import read_design
 from experiments.runs.reference_file import read_reference
 from experiments.thesis.claims.coverage import read_record
 from experiments.thesis.claims.ledger import read_ledger
+from identification.base.axis_file import axis_text, read_axis
 from identification.base.command_line import CommandGroup
 from identification.base.path_types import INPUT
 from identification.model.model_file import read_model
@@ -61,6 +62,13 @@ def table(file: Path) -> None:
 def reference(file: Path) -> None:
     """A sampled reference."""
     read_reference(file)
+
+
+@main.command("axis")
+@FILE
+def axis(file: Path) -> None:
+    """An axis.toml; what it says is written again."""
+    axis_text(read_axis(file), {})
 
 
 @main.command("claims")

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from experiments.drive.difference_equations import SampledBlock
 from experiments.export.check_run import CheckRun, commands
 from experiments.export.controller import SampledController
 from experiments.export.names import identifier
+from experiments.export.templates import templates
 from identification.base.digits import upper_end
 from identification.base.errors import InputError
+from identification.model.signals import Signals
 
-HERE = Path(__file__).parent
 PRECISIONS: dict[str, type[np.floating]] = {"double": np.float64, "float": np.float32}
 WIDTH = 116
 
@@ -38,16 +37,10 @@ def files(controller: SampledController, run: CheckRun, precision: str = "double
     Raises
     ------
     InputError
-        A number of the controller is beyond a float.
+        A number of the controller or of the run is beyond a float.
     """
     name, kind = controller.name, PRECISIONS[precision]
-    environment = Environment(
-        loader=FileSystemLoader(HERE),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    given, seen = names(controller.signals)
 
     def number(value: float) -> str:
         with np.errstate(over="ignore"):
@@ -57,36 +50,45 @@ def files(controller: SampledController, run: CheckRun, precision: str = "double
         return f"{held!s}" if precision == "double" else f"{held!s}F"
 
     def table(values: Iterable[float]) -> str:
-        return "\n".join(f"    {line}" for line in wrap(", ".join(map(number, values)), WIDTH))
+        return "\n".join(f"    {line}" for line in wrap(", ".join(map(number, values)), WIDTH, break_on_hyphens=False))
 
-    environment.filters.update(number=number, rows=table, comment=_comment)
+    environment = templates(number=number, rows=table, comment=_comment)
     content = {
         "c": controller,
         "real": precision,
         "samples": np.column_stack([run.reference, run.measurement, run.control, run.command]).tolist(),
-        "tolerance": _difference(controller, run, kind),
-        "input": identifier(controller.signals.input_name, "input"),
-        "output": identifier(controller.signals.output_name, "output"),
+        "input": given,
+        "output": seen,
         "limits": [limit if math.isfinite(limit) else None for limit in controller.limits],
         **_memories(controller),
     }
 
-    def text(template: str) -> str:
-        return environment.get_template(template).render(content)
+    def text(template: str, **more: float) -> str:
+        return environment.get_template(template).render(content, **more)
 
+    source = text("controller.c.j2")  # first, since it refuses what no float holds
+    tolerance = _difference(controller, run, kind)
     return {
-        f"{name}.h": text("controller.h.j2"),
-        f"{name}.c": text("controller.c.j2"),
-        f"{name}_test.c": text("controller_test.c.j2"),
+        f"{name}.h": text("controller.h.j2", tolerance=tolerance),
+        f"{name}.c": source,
+        f"{name}_test.c": text("controller_test.c.j2", tolerance=tolerance),
         f"{name}_test.csv": run.csv(),
     }
+
+
+def names(signals: Signals) -> tuple[str, str]:
+    """What the names of variables say of the input and of the output, after a word of their own."""
+    return identifier(signals.input_name, "input"), identifier(signals.output_name, "output")
 
 
 def _difference(controller: SampledController, run: CheckRun, kind: type[np.floating]) -> float:
     """How far the commands of this precision are from those of the run, and from those rounded to it; rounded up."""
     if kind is np.float64:
         return 0.0
-    found = commands(controller, run.reference, run.measurement, kind)
+    with np.errstate(all="ignore"):
+        found = commands(controller, run.reference, run.measurement, kind)
+    if not np.isfinite(found).all():
+        raise InputError("the run of its test takes the controller beyond what a float holds; expected doubles")
     pairs = zip(found, (run.control, run.command), strict=True)
     most = max(float(np.abs(own - each).max()) for own, exact in pairs for each in (exact, exact.astype(kind)))
     return float(upper_end(most * (1 + float(np.finfo(kind).eps)), 3))

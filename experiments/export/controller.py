@@ -10,9 +10,11 @@ from design.design_file import Design
 from experiments.drive.difference_equations import SampledBlock
 from experiments.drive.sampled_loop import Drive, controller_blocks
 from experiments.runs.guarantee import Guarantee, guarantee, sector_text
+from identification.base.errors import InputError
 from identification.model.signals import Signals
 
 INTEGRATES = 1e-11  # of the largest singular value of 1 - A: with a smaller one a block integrates
+MOST_LATE = 2**15 - 8  # samples of dead time
 UNSEEN = 1e-9  # of the product of two vectors' lengths: less is 0
 
 
@@ -152,10 +154,15 @@ def sampled_controller(
     ------
     InputError
         There is no such anti-windup; the limits, the rate or the method are none; or the rate is too low for the
-        equations to have one solution.
+        equations to have one solution, or so high that the dead time has more than :data:`MOST_LATE` samples.
     """
     drive = Drive(rate_hz, method, limits)
-    kind = design.chosen(anti_windup)
+    kind, late = design.chosen(anti_windup), design.loop_plant.delay_s * rate_hz
+    if late > MOST_LATE:
+        raise InputError(
+            f"at {rate_hz:g} Hz the dead time is {late:.6g} samples long; expected at most {MOST_LATE}, to which every "
+            "int of C counts (a lower rate)"
+        )
     forward, feedback, theta, around = controller_blocks(design, kind, drive, "coprime")
     return SampledController(
         name=name,
@@ -181,5 +188,5 @@ def _promise(given: Guarantee) -> str:
         covered = f"of runs that need a smaller sector than {sector_text(given.sector)}"
     return (
         f"In continuous time the windup ends {covered}, if the reference takes a control within the limits; of the "
-        "sampled loop nothing is proved"
+        "sampled loop beyond its limits nothing is proved"
     )

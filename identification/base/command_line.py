@@ -18,7 +18,8 @@ from identification.base.files import write_protected_too
 
 HELP = {"show_default": True, "help_option_names": ["-h", "--help"]}  # of every command
 QUOTED = 80  # characters of a value in a sentence
-WRITTEN = {"output", "page", "build", "responses", "record", "figure"}  # options that name what a command writes
+WRITTEN = {"output", "page", "build", "responses", "record", "figure", "junit", "markdown"}
+"""Options that name what a command writes."""
 EXTRAS = {"bokeh": "explore"} | dict.fromkeys(("dask", "distributed", "pyarrow"), "campaign")
 """The extras of pyproject.toml by the modules that they install."""
 
@@ -58,7 +59,19 @@ class CommandGroup(Console):
         click.version_option(package_name="antiwindup-thesis")(self)
 
     def add_command(self, cmd: click.Command, name: str | None = None) -> None:
-        super().add_command(with_force(cmd), name)
+        names = {param.name for param in cmd.params}
+        if names & WRITTEN and "force" not in names:
+            cmd.params.append(
+                click.Option(
+                    ["--force"],
+                    is_flag=True,
+                    is_eager=True,  # outputs are looked at as they are parsed
+                    expose_value=False,
+                    callback=_forced,
+                    help="Replace write-protected files.",
+                )
+            )
+        super().add_command(cmd, name)
 
     def invoke(self, ctx: click.Context) -> Any:
         atexit.register(gc.freeze)  # without it the interpreter sweeps all modules as it ends: a third of a second
@@ -85,23 +98,6 @@ class CommandGroup(Console):
         except click.ClickException as error:
             error.message = plain(error.message)  # type: ignore[misc]
             raise
-
-
-def with_force(cmd: click.Command) -> click.Command:
-    """The command with the option ``--force``, if it writes and has none yet."""
-    names = {param.name for param in cmd.params}
-    if names & WRITTEN and "force" not in names:
-        cmd.params.append(
-            click.Option(
-                ["--force"],
-                is_flag=True,
-                is_eager=True,  # outputs are looked at as they are parsed
-                expose_value=False,
-                callback=_forced,
-                help="Replace write-protected files.",
-            )
-        )
-    return cmd
 
 
 def _forced(ctx: click.Context, _param: click.Parameter, is_asked: bool) -> None:

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from identification.base.arrays import Flags, Real, Whole
+from identification.base.errors import InputError
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 
@@ -47,6 +48,32 @@ class Structure:
     right: int = 0
     delayed: bool = True
     real_pairs: tuple[int, int, int] = (0, 0, 0)
+
+    @classmethod
+    def of(cls, plant: PlantModel, *, delayed: bool = True) -> Structure:
+        """The structure of a plant whose modes and real roots are written as they are.
+
+        Raises
+        ------
+        InputError
+            A pole lies in the right half plane, or a mode on the imaginary axis.
+        """
+        if plant.unstable_poles or any(mode.zeta == 0 for mode in (*plant.zero_modes, *plant.pole_modes)):
+            raise InputError("the plant has poles in the right half plane or modes without damping; no fit has such")
+        right = [mode.zeta < 0 for mode in plant.zero_modes].count(True), [a < 0 for a in plant.real_zeros].count(True)
+        left = len(plant.zero_modes) - right[0], len(plant.real_zeros) - right[1]
+        sides = left, right, (len(plant.pole_modes), len(plant.real_poles))
+        zeros, zeros_right, poles = (2 * modes + rates for modes, rates in sides)
+        pairs = [rates // 2 for _, rates in sides]
+        return cls(plant.integrators, zeros, poles, zeros_right, delayed, (pairs[0], pairs[1], pairs[2]))
+
+    def theta(self, plant: PlantModel) -> Real:
+        """Theta (size,) of a plant of this structure; modes sorted by omega and real roots by rate, each kind apart."""
+        modes = [*sorted(plant.zero_modes, key=lambda mode: mode.zeta < 0), *plant.pole_modes]
+        rates = [*sorted(plant.real_zeros, key=lambda rate: rate < 0), *plant.real_poles]
+        values = [plant.gain, *(each for mode in modes for each in (mode.omega, mode.zeta)), *rates]
+        theta = np.append(np.log(np.abs(values)), plant.delay_s)
+        return np.asarray(theta[self.in_order(theta)])
 
     @property
     def proper(self) -> bool:

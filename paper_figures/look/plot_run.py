@@ -7,7 +7,6 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
@@ -18,7 +17,7 @@ from identification.base.arrays import Real
 from identification.base.errors import InputError
 from identification.model.signals import UNNAMED, Signals
 from paper_figures.look.frequency_axis import plain
-from paper_figures.look.panels import MOST_POINTS, Trace, band, draw, key
+from paper_figures.look.panels import MOST_POINTS, band, envelope, key, view
 from paper_figures.look.stretches import saturated_stretches
 from paper_figures.look.style import FAMILY, FULL_WIDTH, LINES, panel_letters, styled
 
@@ -30,8 +29,9 @@ KINDS = {
     "corrected": "corrected anti-windup",
     "internal-model": "internal model",
     "weston-postlethwaite": "Weston and Postlethwaite",
+    **{name: name for name in ("back-calculation", "conditioning", "observer", "static")},
 }
-"""What an anti-windup's runs are called, where that is not its own name."""
+"""The lines of the runs of each anti-windup by its name; others have the next one of the family's."""
 SATURATED: dict[str, Any] = {"facecolor": "#E9DFC6", "edgecolor": "none", "zorder": 0.5}
 THIN = 0.9
 FAR = 1.0  # times the view of the control, within which a limit that it does not reach is shown too
@@ -75,17 +75,17 @@ def plot_run(
     figure = Figure(figsize=(FULL_WIDTH, 3.0 + 1.5 * len(named)), layout="constrained")
     panels = list(figure.subplots(2 + len(named), 1, sharex=True))
     output, error, controls = panels[0], panels[1], panels[2:]
-    looks = _looks(named)
-    reference = _signal(next(iter(named.values())), "reference")
-    scale = float(np.max(np.abs(reference[np.isfinite(reference)]), initial=0.0))
-    time_s = pd.Series(next(iter(named.values())).time_s)
-    for panel, name, symbol in ((output, "output", "output $y$"), (error, "error", "error $r - y$")):
-        traces = [Trace(pd.Series(reference), LINES["reference"], "reference $r$")] if name == "output" else []
+    looks, first = _looks(named), next(iter(named.values()))
+    reference = _signal(first, "reference")
+    scale = float(np.max(np.abs(reference)))
+    _line(output, first, reference, LINES["reference"], "reference $r$")
+    for panel, name, symbol in ((output, "output", "$y$"), (error, "error", "$r - y$")):
         for run_name, run in named.items():
-            called = f"$y$, {plain(_said(run_name))}" if name == "output" else f"$r - y$, {plain(_said(run_name))}"
-            traces.append(Trace(pd.Series(_signal(run, name)), looks[run_name], called if run_name else symbol))
-        draw(panel, time_s, traces, scale)
+            _line(panel, run, _signal(run, name), looks[run_name], f"{symbol}{_beside(run_name)}")
+        values = [_signal(run, name) for run in named.values()]
+        panel.set_ylim(*view([*values, reference] if name == "output" else values, scale))
         key(panel)
+    output.set_xlim(min(run.time_s[0] for run in named.values()), max(run.time_s[-1] for run in named.values()))
     output.set_ylabel(plain(signals.output))
     error.set_ylabel(plain(f"error [{signals.output_unit}]" if signals.output_unit else "error"))
     for panel, (name, run) in zip(controls, named.items(), strict=True):
@@ -101,20 +101,15 @@ def plot_run(
 
 def _control(panel: Axes, name: str, run: AnyRun, line: Mapping[str, Any], limits: tuple[float, float] | None) -> None:
     """Draw what is asked for upon what the actuator gives out, the limits, and when it is beyond them."""
-    beside = f", {plain(_said(name))}" if name else ""
     low, high = limits or (-np.inf, np.inf)
-    given = run.saturated_control[np.isfinite(run.saturated_control)]
-    least, most = (float(extreme(given, initial=0.0)) for extreme in (np.min, np.max))
-    least, most = low if isfinite(low) else least, high if isfinite(high) else most
-    traces = [
-        Trace(pd.Series(run.saturated_control), band(line), "actuator"),
-        Trace(pd.Series(run.control), {**line, "linewidth": THIN}, f"control $u${beside}"),
-    ]
-    draw(panel, pd.Series(run.time_s), traces, max(-least, most))
-    room = BEYOND * (most - least) or 1.0
-    bottom, top = panel.get_ylim()
-    bottom, top = max(bottom, least - room), min(top, most + room)
+    _line(panel, run, run.saturated_control, band(line), "actuator")
+    _line(panel, run, run.control, {**line, "linewidth": THIN}, f"control $u${_beside(name)}")
     ends = [end for end in (low, high) if isfinite(end)]
+    least = low if isfinite(low) else float(run.saturated_control.min())
+    most = high if isfinite(high) else float(run.saturated_control.max())
+    room = BEYOND * (most - least) or 1.0
+    bottom, top = view([run.control, run.saturated_control], 0.0)
+    bottom, top = max(bottom, least - room), min(top, most + room)
     near = [end for end in ends if bottom - FAR * (top - bottom) < end < top + FAR * (top - bottom)]
     edge = EDGE * (top - bottom)
     panel.set_ylim(min([bottom, *(end - edge for end in near)]), max([top, *(end + edge for end in near)]))
@@ -127,6 +122,11 @@ def _control(panel: Axes, name: str, run: AnyRun, line: Mapping[str, Any], limit
             across = panel.get_xaxis_transform()
             panel.broken_barh(spans, (0, 1), transform=across, label="beyond them", **SATURATED)
     key(panel)
+
+
+def _line(panel: Axes, run: AnyRun, values: Real, line: Mapping[str, Any], label: str) -> None:
+    """A line, thinned to its envelope; where two meet, the thin one lies upon the broad one."""
+    panel.plot(*envelope(run.time_s, values), **line, label=label, zorder=3 - line["linewidth"] / 10)
 
 
 def _merged(stretches: Real, gap_s: float) -> Real:
@@ -142,15 +142,14 @@ def _signal(run: AnyRun, name: str) -> Real:
     return np.asarray(run.outputs[name] if isinstance(run, Run) else getattr(run, name))
 
 
-def _said(name: str) -> str:
-    """What a run of this name is called in a key."""
-    return KINDS.get(name, name)
+def _beside(name: str) -> str:
+    """What a key adds to the symbol of a run's signal."""
+    return f", {plain(KINDS.get(name, name))}" if name else ""
 
 
 def _looks(named: Mapping[str, AnyRun]) -> dict[str, dict[str, Any]]:
     """The line of each run: that of its anti-windup, else the next of the family's."""
     looks, rest = {}, iter(FAMILY * len(named))
     for name in named:
-        known = LINES.get(_said(name)) if name else LINES["model"]
-        looks[name] = known or LINES[next(rest)]
+        looks[name] = LINES[KINDS.get(name) or next(rest)] if name else LINES["model"]
     return looks

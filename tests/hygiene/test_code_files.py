@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from antiwindup import code_files
-from antiwindup.steps import Asked, refit_steps, report_steps, thesis_steps
+from antiwindup.refit_steps import refit_steps
+from antiwindup.steps import Asked
+from antiwindup.thesis_steps import report_steps, thesis_steps
 from paper_figures.thesis.figure_registry import figure_module, figure_names
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -19,7 +21,7 @@ ROOMS = ("identification", "design", "experiments", "paper_figures")
 
 ASKED = Asked(Path("build"), None, ("a.csv",), (Path("a.csv"),))
 BEFORE = thesis_steps(ASKED)
-STEPS = {step.command: step for step in (*BEFORE, *report_steps(ASKED, BEFORE), refit_steps(ASKED)[-1])}
+STEPS = {step.command: step for step in (*BEFORE, *report_steps(ASKED, BEFORE), *refit_steps(ASKED))}
 
 
 def words(command: tuple[str, ...]) -> str:
@@ -41,6 +43,7 @@ RUNS = {
         *["implied", "--reference-hz", "0.25", "--epsilon", "1e-4", "--output", scratch + "/design.json"]
     ],
     "design extended": ["implied", "--reference-hz", "0.5", "--output", scratch + "/other.json"],
+    "experiments axis": ["implied", "--reference-hz", "0.5", "--output", scratch],
     "experiments thesis pid": ["--output", scratch],
     "experiments thesis equations": ["--page", scratch + "/equations.md"],
     "paper_figures draw fig_2_05": ["--results", scratch, "--output", scratch],

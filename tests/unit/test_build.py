@@ -17,29 +17,19 @@ from click.testing import CliRunner
 import antiwindup.build
 from antiwindup.__main__ import main as antiwindup_command
 from antiwindup.build import Build, Crash
-from antiwindup.steps import Asked, Step, refit_steps, report_steps, thesis_steps
+from antiwindup.refit_steps import FIGURES, refit_steps
+from antiwindup.steps import Asked, Step
+from antiwindup.thesis_steps import report_steps, thesis_steps
 from identification.base.errors import InputError
 from identification.base.files import note
 from identification.base.folder_lock import locked_folder
 
-EXTENDED = {
-    *("design_extended.json", "design_robust.json", "results/interpolation_map.csv"),
-    *("results/campaign.parquet", "results/campaign_distance.csv"),
-    *(
-        f"results/{name}{part}.csv"
-        for name in ("extended", "f_gamma", "trade_off", "interpolation", "robustness", "limits_extended", "sampled")
-        for part in ("", "_summary")
-    ),
-    *("results/campaign.csv", "results/campaign_summary.csv", "results/compare.csv", "results/compare_runs.csv"),
-    *("results/hidden_modes.csv", "results/hidden_modes_summary.csv"),
-    *(
-        f"figures/fig_{n}.{kind}"
-        for n in (
-            *("2_10", "2_11", "4_01", "4_02", "4_03", "4_04"),
-            *("a_01", "a_02", "a_03", "a_04", "a_05", "a_06", "a_08", "a_09"),
-        )
-        for kind in ("pdf", "svg", "png", "txt")
-    ),
+OF_DESIGN = {
+    *("design.json", "results/campaign.parquet", "results/campaign.csv", "results/campaign_distance.csv"),
+    *("results/campaign_summary.csv", "results/compare.csv", "results/compare_runs.csv", "results/tracking.csv"),
+    *("results/tracking_summary.csv", "results/rates.csv", "results/limits_extended.csv"),
+    *("results/limits_extended_summary.csv",),
+    *(f"figures/{name}.{kind}" for name in FIGURES for kind in ("pdf", "svg", "png", "txt")),
 }
 """What a refit makes with the extended design or with what was made with it."""
 
@@ -106,12 +96,12 @@ def refit(
         asked = Asked(tmp_path / "mine", None, (), (tmp_path / "a.csv",))
         asked = replace(asked, **changes)  # type: ignore[arg-type]
         first = refit_steps(asked) if goal == "refit" else thesis_steps(asked)
-        steps[:] = [*first, *report_steps(asked, first)]
+        steps[:] = first if goal == "refit" else [*first, *report_steps(asked, first)]
         wanted = [step for step in steps if step.name in only] or (steps if goal == "report" else first)
         build = Build(asked.folder, steps, inputs or asked.sweep_files, wanted, goal == "refit", 4, force)
         told: list[int] = []
         build.run(lambda ended, running: told.append(ended))
-        assert told == list(range(1, len(told) + 1))
+        assert told == list(range(1, build.runs + 1))
         return build
 
     return run
@@ -127,9 +117,8 @@ def built(tmp_path: Path) -> dict[str, str]:
 def test_all_is_made_and_then_nothing_is_left_to_do(refit: Refit, tmp_path: Path) -> None:
     first = refit()
     names = set(built(tmp_path))
-    assert {"model.json", "design_delay_free.json", "design_extended.json", "summary.pdf", "summary.txt"} <= names
-    assert {f"figures/fig_{n}.pdf" for n in ("2_09", "2_10", "2_14", "4_01", "4_04")} <= names
-    assert not {"figures/fig_2_01.pdf", "figures/fig_2_02.pdf", "results/pid.csv", "report/index.html"} & names
+    assert {"model.json", "axis.toml", "design_delay_free.json", "summary.pdf", "summary.txt", *OF_DESIGN} <= names
+    assert not any("thesis" in word for step in first.steps for word in step.command)
     assert not any("refused" in name or "partial" in name or "lock" in name for name in names)
     assert first.printed["fit"] == "fit done\n"
     assert refit().printed == {}
@@ -165,13 +154,13 @@ def test_another_kind_of_build_takes_away_what_is_not_of_it(refit: Refit, tmp_pa
 def test_a_refused_design_takes_only_what_hangs_on_it(refit: Refit, behaviour: dict[str, str], tmp_path: Path) -> None:
     refit()
     everything = built(tmp_path)
-    behaviour["design extended"] = behaviour["design robust"] = "refuses"
+    behaviour["design"] = "refuses"
     (tmp_path / "a.csv").write_text("b", encoding="utf-8")
     refused = refit().refused
-    assert refused == {name: f"{name} will not" for name in ("design extended", "design robust")}
+    assert refused == {"design": "design will not"}
     now = built(tmp_path)
-    assert set(everything) - set(now) == EXTENDED
-    assert now["design_extended.refused.txt"] == "design extended will not\n"
+    assert set(everything) - set(now) == OF_DESIGN
+    assert now["design.refused.txt"] == "design will not\n"
     again = refit()
     assert (again.refused, again.printed) == (refused, {})
     behaviour.clear()
@@ -181,20 +170,20 @@ def test_a_refused_design_takes_only_what_hangs_on_it(refit: Refit, behaviour: d
 
 
 def test_a_refused_experiment_leaves_its_design(refit: Refit, behaviour: dict[str, str], tmp_path: Path) -> None:
-    behaviour["f_gamma"] = behaviour["campaign"] = "refuses"
+    behaviour["limits"] = behaviour["campaign"] = "refuses"
     refit()
     names = set(built(tmp_path))
-    assert {"design_extended.json", "results/f_gamma.refused.txt", "figures/fig_4_01.pdf", "summary.pdf"} <= names
-    assert {"results/campaign.refused.txt", "figures/fig_a_05.pdf"} <= names
-    assert not names & {"figures/fig_2_10.pdf", "figures/fig_2_11.pdf", "figures/fig_a_06.pdf", "results/campaign.csv"}
-    behaviour["design extended"] = "refuses"
+    assert {"design.json", "results/limits_extended.refused.txt", "results/compare.csv", "summary.pdf"} <= names
+    assert "results/campaign.refused.txt" in names
+    assert not names & {"results/limits_extended.csv", "results/campaign.csv"}
+    behaviour["design"] = "refuses"
     (tmp_path / "a.csv").write_text("b", encoding="utf-8")
     refit()
-    assert "results/f_gamma.refused.txt" not in built(tmp_path)
+    assert "results/limits_extended.refused.txt" not in built(tmp_path)
 
 
 def test_a_crash_is_no_refusal(refit: Refit, behaviour: dict[str, str], tmp_path: Path) -> None:
-    behaviour["design delay_free"] = "crashes"
+    behaviour["design delay free"] = "crashes"
     with pytest.raises(Crash, match="Traceback of it"):
         refit()
     assert "summary.pdf" not in built(tmp_path)
@@ -210,11 +199,69 @@ def test_a_refused_fit_stops_everything_and_nothing_old_stays(
     behaviour["fit"] = "refuses"
     with pytest.raises(InputError, match=r"^fit will not$"):
         refit("refit", fit=("--modes", "1"))
-    assert set(built(tmp_path)) == {"claims.csv"}
-    (tmp_path / "mine" / "claims.csv").unlink()
-    with pytest.raises(InputError, match=r"^fit will not$"):
-        refit("refit", fit=("--modes", "1"))
     assert set(built(tmp_path)) == set()
+
+
+@pytest.fixture
+def begun(refit: Refit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, set[str]]]:
+    """The last word but one of each command that is started, and the files that are there by then."""
+    found: list[tuple[str, set[str]]] = []
+    start = antiwindup.build.start
+
+    def noted(command: Sequence[str], log: Path, journal: Path) -> object:
+        found.append((command[1], {name for name in built(tmp_path) if "partial" not in name}))
+        return start(command, log, journal)
+
+    monkeypatch.setattr(antiwindup.build, "start", noted)
+    return found
+
+
+def test_the_page_comes_first_and_again_with_what_is_done(
+    refit: Refit, begun: list[tuple[str, set[str]]], tmp_path: Path
+) -> None:
+    refit()
+    pages = [there for name, there in begun if name == "summary"]
+    assert [name for name, _ in begun][:2] == ["fit", "summary"]
+    assert [{"design.json", "results/tracking.csv", "results/campaign.csv"} & there for there in pages] == [
+        set(),
+        {"design.json", "results/tracking.csv"},
+        {"design.json", "results/tracking.csv", "results/campaign.csv"},
+    ]
+    begun.clear()
+    refit()
+    assert begun == []
+
+
+def test_a_first_page_does_not_stand_beside_what_was_made_of_other_sweeps(
+    refit: Refit, begun: list[tuple[str, set[str]]], tmp_path: Path
+) -> None:
+    refit()
+    begun.clear()
+    (tmp_path / "a.csv").write_text("b", encoding="utf-8")
+    refit()
+    first = next(there for name, there in begun if name == "summary")
+    assert not {"design.json", "axis.toml", "results/campaign.csv", "figures/bode.pdf"} & first
+    changed = built(tmp_path)
+    (tmp_path / "mine").rename(tmp_path / "before")
+    refit()
+    assert built(tmp_path) == changed
+
+
+@pytest.mark.parametrize("stopped", ["bode", "tracking", "campaign"])
+def test_a_build_that_was_stopped_between_two_pages_goes_on(
+    refit: Refit, begun: list[tuple[str, set[str]]], behaviour: dict[str, str], tmp_path: Path, stopped: str
+) -> None:
+    behaviour[stopped] = "crashes"
+    with pytest.raises(Crash):
+        refit()
+    behaviour.clear()
+    begun.clear()
+    refit()
+    ours = built(tmp_path)
+    assert "fit" not in {name for name, _ in begun}
+    (tmp_path / "mine").rename(tmp_path / "before")
+    refit()
+    assert built(tmp_path) == ours
 
 
 def test_figures_fail_when_a_design_refuses(refit: Refit, behaviour: dict[str, str], tmp_path: Path) -> None:
@@ -232,7 +279,7 @@ def test_nothing_of_the_users_is_replaced_or_removed(
     own = [
         "design_notes.md",
         "design_drawings/part.step",
-        "results/extended_run.csv",
+        "results/compare_mine.csv",
         "figures/fig_2_01.bak",
         "report/x",
     ]
@@ -244,11 +291,11 @@ def test_nothing_of_the_users_is_replaced_or_removed(
     (tmp_path / "a.csv").write_text("b", encoding="utf-8")
     with pytest.raises(InputError):
         refit(goal)
-    assert set(built(tmp_path)) - {"claims.csv", "results/pid.csv"} >= {*own, ".partial-notes.txt"}
+    assert set(built(tmp_path)) >= {*own, ".partial-notes.txt"}
     assert all((mine / name).read_text(encoding="utf-8") == "mine" for name in own)
 
 
-@pytest.mark.parametrize("name", ["model.json", "results/extended.csv", "figures/fig_4_01.svg", "f_gamma.refused.txt"])
+@pytest.mark.parametrize("name", ["model.json", "results/compare.csv", "figures/bode.svg", "compare.refused.txt"])
 def test_a_place_that_is_taken_is_refused_before_anything_is_done(refit: Refit, tmp_path: Path, name: str) -> None:
     place = tmp_path / "mine" / ("results/" + name if "refused" in name else name)
     place.parent.mkdir(parents=True)
@@ -265,17 +312,17 @@ def test_a_file_that_was_changed_is_refused_and_outlives_every_build(
     refit: Refit, behaviour: dict[str, str], tmp_path: Path
 ) -> None:
     refit()
-    table = tmp_path / "mine" / "results" / "extended.csv"
+    table = tmp_path / "mine" / "results" / "tracking.csv"
     table.write_text("corrected by hand", encoding="utf-8")
-    with pytest.raises(InputError, match=r"extended\.csv: was changed since it was written"):
+    with pytest.raises(InputError, match=r"tracking\.csv: was changed since it was written"):
         refit()
     asked = Asked(tmp_path / "mine", None, (), (tmp_path / "a.csv",))
-    (tmp_path / "mine" / "figures" / "fig_4_01.pdf").write_text("also", encoding="utf-8")
+    (tmp_path / "mine" / "figures" / "bode.pdf").write_text("also", encoding="utf-8")
     fit = refit_steps(asked)[:1]
     Build(asked.folder, fit, [], fit, goes_on=True, jobs=1).run(lambda *_: None)  # a build without tables
     assert table.read_text(encoding="utf-8") == "corrected by hand"
-    assert "figures/fig_4_01.pdf" in built(tmp_path)
-    assert "results/extended_summary.csv" not in built(tmp_path)
+    assert "figures/bode.pdf" in built(tmp_path)
+    assert "results/tracking_summary.csv" not in built(tmp_path)
 
 
 def test_a_write_protected_output_is_refused_before_anything_is_done(refit: Refit, tmp_path: Path) -> None:
@@ -322,21 +369,21 @@ def test_what_a_killed_build_had_begun_is_replaced_if_it_is_ours(refit: Refit, t
     refit()
     mine, ours = tmp_path / "mine", built(tmp_path)
     listed = json.loads((mine / "manifest.json").read_text(encoding="utf-8"))
-    for name in ("model.json", "design_extended.json"):
+    for name in ("model.json", "design.json"):
         listed["files"][name]["content"] = None
     (mine / "manifest.json").write_text(json.dumps(listed), encoding="utf-8")
-    note(mine / ".antiwindup.journal", {mine / name: mine / name for name in ("model.json", "design_extended.json")})
+    note(mine / ".antiwindup.journal", {mine / name: mine / name for name in ("model.json", "design.json")})
     with (mine / ".antiwindup.journal").open("a", encoding="utf-8") as journal:
         journal.write('["cut off by the ki')
-    (mine / "design_extended.json").write_text("mine", encoding="utf-8")
-    with pytest.raises(InputError, match=r"design_extended\.json: is there already, written by somebody else"):
+    (mine / "design.json").write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match=r"design\.json: is there already, written by somebody else"):
         refit()
-    assert built(tmp_path)["design_extended.json"] == "mine"
-    (mine / "design_extended.json").unlink()
+    assert built(tmp_path)["design.json"] == "mine"
+    (mine / "design.json").unlink()
     moved = tmp_path / "moved"
     mine.rename(moved)
     mine.symlink_to(moved)
-    assert {"fit", "design extended"} <= set(refit().printed)
+    assert {"fit", "design"} <= set(refit().printed)
     assert built(tmp_path) == ours
 
 
@@ -351,14 +398,14 @@ def test_an_input_that_is_an_output_is_refused(refit: Refit, tmp_path: Path, nam
 
 def test_a_link_in_the_place_of_an_output_is_not_followed(refit: Refit, tmp_path: Path) -> None:
     refit()
-    figure, own = tmp_path / "mine" / "figures" / "fig_4_01.pdf", tmp_path / "own.pdf"
+    figure, own = tmp_path / "mine" / "figures" / "bode.pdf", tmp_path / "own.pdf"
     figure.rename(own)
     for target in (own, tmp_path / "nowhere"):
         figure.unlink(missing_ok=True)
         figure.symlink_to(target)
         (tmp_path / "a.csv").write_text("b", encoding="utf-8")
         before = own.read_bytes()
-        with pytest.raises(InputError, match=r"fig_4_01\.pdf: is there already"):
+        with pytest.raises(InputError, match=r"bode\.pdf: is there already"):
             refit()
         assert own.read_bytes() == before
         assert not (tmp_path / "nowhere").exists()
@@ -372,15 +419,15 @@ def test_a_file_that_cannot_be_removed_stays_ours(
     unlink = Path.unlink
 
     def barred(path: Path, missing_ok: bool = False) -> None:
-        if path.name == "fig_4_01.svg":
+        if path.name == "bode.svg":
             raise PermissionError(13, "Permission denied")
         unlink(path, missing_ok)
 
-    behaviour["design extended"] = "refuses"
+    behaviour["fit"] = "refuses"
     (tmp_path / "a.csv").write_text("b", encoding="utf-8")
     with monkeypatch.context() as patch:
         patch.setattr(Path, "unlink", barred)
-        with pytest.raises(InputError, match=r"fig_4_01\.svg: cannot be removed \(Permission denied\)"):
+        with pytest.raises(InputError, match=r"bode\.svg: cannot be removed \(Permission denied\)"):
             refit()
     behaviour.clear()
     (tmp_path / "a.csv").write_text("a", encoding="utf-8")
@@ -426,16 +473,16 @@ def test_what_is_no_journal_is_refused_and_left(refit: Refit, tmp_path: Path, ma
 def test_what_somebody_puts_into_a_place_while_a_build_runs_is_refused_and_left(
     refit: Refit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    figure = tmp_path / "mine" / "figures" / "fig_4_01.pdf"
+    figure = tmp_path / "mine" / "results" / "compare.csv"
 
     def code_of(command: Sequence[str]) -> str:
-        if "campaign-tables" in command and not figure.exists():
+        if "extended" in command and not figure.exists():
             figure.parent.mkdir(exist_ok=True)
             precious(figure)
         return ""
 
     monkeypatch.setattr(antiwindup.build, "code_of", code_of)
-    with pytest.raises(InputError, match=r"fig_4_01\.pdf: is there already"):
+    with pytest.raises(InputError, match=r"compare\.csv: is there already"):
         refit()
     assert figure.read_text(encoding="utf-8") == "precious notes"
 
@@ -488,7 +535,7 @@ SWEEP = Path(__file__).resolve().parents[2] / "data" / "elevation" / "synthetic_
         (["refit", "nowhere.csv", "--output", "mine"], "nowhere.csv: no such file"),
         (["refit", ".", "--output", "mine"], ".: holds no file that ends in .csv"),
         (["refit", str(SWEEP), "--output", "file"], "file: cannot be made (File exists)"),
-        (["refit", str(SWEEP), "--output", "mine", "--limit", "nan"], "--limit is nan; expected a positive number"),
+        (["refit", str(SWEEP), "--output", "mine", "--limit", "nan"], "--limit is [nan]; expected [low, high]"),
         (["figures", str(SWEEP), "--output", "mine", "--model", "nowhere.json"], "nowhere.json: no such file"),
         (["report", str(SWEEP), "--output", "mine", "--model", "nothing"], "nothing"),
         (["figures", str(SWEEP), "--output", "mine", "--only", "fig_9"], "--only is 'fig_9'; expected one of fig_2_01"),

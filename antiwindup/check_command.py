@@ -1,0 +1,61 @@
+"""The command ``check``: whether a model, and a design of it, still hold for new sweeps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from identification.__main__ import reading_options
+from identification.base.path_types import INPUT, INPUT_FILE, OUTPUT_FILE
+
+
+@click.command("check")
+@click.argument("model")
+@click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)
+@click.option(
+    "--against", type=INPUT_FILE, metavar="DESIGN", help="A design.json of MODEL, looked at on the new plant."
+)
+@click.option("--junit", type=OUTPUT_FILE, help="JUnit XML to write: a test case for each question and sweep.")
+@click.option("--markdown", type=OUTPUT_FILE, help="Markdown to write, as for a job's summary.")
+@reading_options
+def check(
+    model: str,
+    sweeps: tuple[Path, ...],
+    against: Path | None,
+    junit: Path | None,
+    markdown: Path | None,
+    **reading: Any,
+) -> None:
+    """See whether new SWEEP files still lie within W_a of MODEL, and which parameters moved.
+
+    MODEL is a model.json, or table or implied. The exit status is 0 if all holds, 1 if something moved, 2 if the input
+    was refused.
+    """
+    from design.asked_model import asked_model
+    from design.design_file import read_design
+    from experiments.checking import files
+    from experiments.checking.answers import answers, has_moved
+    from experiments.checking.check_model import check_model
+    from experiments.checking.words import text
+    from identification.base.files import require_writable, write_whole
+    from identification.formats.reading import Reading
+    from identification.sweeps.read_sweeps import input_files, read_sweeps
+
+    inputs = [Path(model), *input_files(sweeps), *([against] if against else [])]
+    targets = {path: made for path, made in ((junit, files.junit), (markdown, files.markdown)) if path is not None}
+    require_writable(*targets, inputs=inputs)
+    content, design = asked_model(model), None if against is None else read_design(against)
+    tests = read_sweeps(sweeps, Reading(**{k: v for k, v in reading.items() if v is not None}))
+    found = check_model(content, tests, design)
+    said = text(found)
+
+    def writer(content: str) -> Callable[[Path], object]:
+        return lambda path: path.write_text(content, encoding="utf-8")
+
+    write_whole({path: writer(made(found)) for path, made in targets.items()}, inputs)
+    click.echo(said)
+    if has_moved(answers(found)):
+        click.get_current_context().exit(1)

@@ -1,0 +1,26 @@
+"""The command ``new``: an axis.toml to fill in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from identification.base.axis_file import axis_text
+from identification.base.errors import InputError
+from identification.base.files import is_there, require_writable, write_whole
+
+
+@click.command("new")
+@click.argument("path", metavar="[FILE]", type=click.Path(path_type=Path), default=Path("axis.toml"))
+@click.option("--force", is_flag=True, help="Replace a file that is there.")
+def new(path: Path, force: bool) -> None:
+    """Write FILE, axis.toml unless given: names, units, reference, limits and computer of an axis, each with a comment.
+
+    Every line is a comment at first; refit and the other commands take the file with --axis.
+    """
+    if not force and is_there(path):
+        raise InputError(f"{path}: is there already; expected another name, or --force")
+    require_writable(path)
+    write_whole({path: lambda place: place.write_text(axis_text({}, {}), encoding="utf-8")})
+    click.echo(f"-> {path}: take the # away from the lines that you know")

@@ -1,0 +1,242 @@
+"""axis.toml: what an engineer knows of an axis; its keys are the names of options of the commands."""
+
+from __future__ import annotations
+
+import json
+import math
+import textwrap
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from identification.base.errors import InputError, shown
+from identification.base.files import read_text
+
+WIDTH = 100  # of a comment, in characters
+SINUSOIDS = ("amplitude", "phase", "offset", "slope")
+"""The keys of a reference that is computed, beside its frequencies."""
+SUPERSEDES = dict.fromkeys(SINUSOIDS, ("reference",)) | {
+    "reference": SINUSOIDS,
+    "reference-omega": ("reference-hz",),
+}
+"""Option -> the keys of a file that it takes the place of, beside its own."""
+
+
+def _number(value: object) -> float | None:
+    """The finite number that a value is, else None; true and false are none."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        return float(value) if math.isfinite(value) else None
+    except OverflowError:
+        return None
+
+
+def _numbers(value: object) -> tuple[float, ...] | None:
+    found = [_number(each) for each in (value if isinstance(value, list | tuple) else [value])]
+    numbers = tuple(each for each in found if each is not None)
+    return numbers if len(numbers) == len(found) > 0 else None
+
+
+def _frequencies(value: object) -> tuple[float, ...] | None:
+    numbers = _numbers(value)
+    return numbers if numbers and min(numbers) >= 0 and len(set(numbers)) == len(numbers) else None
+
+
+def _limits(value: object) -> tuple[float, ...] | None:
+    numbers = _numbers(value) or ()
+    pair = (-numbers[0], numbers[0]) if len(numbers) == 1 else numbers
+    return pair if len(pair) == 2 and pair[0] < pair[1] else None
+
+
+def _positive(value: object) -> float | None:
+    number = _number(value)
+    return number if number is not None and number > 0 else None
+
+
+def _size(value: object) -> float | None:
+    number = _number(value)
+    return number if number is not None and number >= 0 else None
+
+
+def _text(value: object) -> str | None:
+    return str(value) if isinstance(value, str | Path) and str(value) else None
+
+
+READERS: Mapping[str, tuple[Callable[[object], Any], str]] = {
+    "text": (_text, "text in quotes"),
+    "number": (_number, "a finite number"),
+    "positive": (_positive, "a positive finite number"),
+    "size": (_size, "a finite number, 0 or more"),
+    "numbers": (_numbers, "a finite number, or several as [1, 0.2]"),
+    "frequencies": (_frequencies, "a frequency, 0 or more, or several that differ as [0.5, 2]"),
+    "limits": (_limits, "[low, high] with low < high, or one positive number for both sides"),
+}
+"""Kind of a value -> what reads one, or gives None; and what is expected."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """A line of the file.
+
+    Parameters
+    ----------
+    kind
+        A name in :data:`READERS`, or words with ``|`` between, one of which it is.
+    example
+        A value as TOML has it.
+    comment
+        What it is and in which unit.
+    """
+
+    kind: str
+    example: str
+    comment: str
+
+    def read(self, value: object, place: str) -> Any:
+        """The value, a float, a tuple of floats or text; raises InputError, which begins with ``place``, if it is none.
+
+        One number for the limits becomes a pair.
+        """
+        words = self.kind.split("|")
+        read, expected = READERS.get(self.kind, (lambda word: word if word in words else None, f"one of {words}"))
+        found = read(value)
+        if found is None:
+            seen = list(value) if isinstance(value, tuple) else value
+            raise InputError(f"{place} is {shown(seen)}; expected {expected}")
+        return found
+
+
+KEYS = {
+    "input-name": Key("text", '"motor current"', "What the plant's input is called: what the drive is told to give."),
+    "input-unit": Key("text", '"A"', "Its unit."),
+    "output-name": Key("text", '"position"', "What the plant's output is called: what the sensor gives."),
+    "output-unit": Key("text", '"mm"', "Its unit."),
+    "reference-hz": Key(
+        "frequencies",
+        "[0.5, 2]",
+        "Frequencies in Hz that the output follows without lasting error; 0 is a constant, as for a step.",
+    ),
+    "amplitude": Key(
+        "numbers", "[1, 0.2]", "Of the reference at each of these frequencies, in the output's unit; at 0 its level."
+    ),
+    "phase": Key(
+        "numbers", "[0, 1.57]", "Of each, in radians: the reference is the sum of amplitude sin(omega t + phase)."
+    ),
+    "offset": Key("number", "0.0", "Constant part of the reference, in the output's unit; 0 unless given."),
+    "slope": Key("number", "0.1", "Of a ramp that is added, in the output's unit a second."),
+    "reference": Key(
+        "text",
+        '"trajectory.csv"',
+        "The reference as a CSV with the columns time_s and reference, instead of amplitude, phase, offset and slope. "
+        "A name is counted from the folder of this file.",
+    ),
+    "limit": Key("limits", "[-10, 10]", "What the actuator gives at least and at most, in the input's unit."),
+    "rate-limit": Key("positive", "2000", "The most that the actuator changes in a second, in the input's unit."),
+    "rate": Key("positive", "2000", "Samples of the controller's computer in a second."),
+    "quantum": Key("size", "0.005", "Distance of two levels of the actuator, in the input's unit; 0 for none."),
+    "robust-level": Key(
+        "positive",
+        "0.5",
+        "|W_a C S| stays at most this, below 1, where it is no longer proved that the loop is stable with every plant "
+        "within the bound W_a.",
+    ),
+    "guarantee": Key(
+        "global|robust|sector",
+        '"robust"',
+        "What the anti-windup guarantees: global, whatever the control; robust, so for every plant within W_a; sector, "
+        "up to a control.",
+    ),
+    "recovery": Key("positive", "0.5", "Most time in seconds for the anti-windup's slowest mode to fall to 1 %."),
+}
+"""Every key, in the order of the file."""
+
+HEAD = """\
+# An axis: a plant between its actuator and its sensor, and what it has to do. Every line may be left out.
+# With --axis and this file's name, the commands take each line as the option of the same name; an option that is
+# given on the command line goes before."""
+
+
+def read_axis(path: Path) -> dict[str, Any]:
+    """Read an axis.toml.
+
+    Returns
+    -------
+    dict
+        Key -> value, see :meth:`Key.read`; ``reference`` as a path from the current folder.
+
+    Raises
+    ------
+    InputError
+        No such file, no TOML, an unknown key, a value of the wrong kind, or see :func:`require_consistent`.
+    """
+    try:
+        content = tomllib.loads(read_text(path))
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{path}: is no TOML ({error}); expected lines such as limit = [-10, 10]") from None
+    found = {}
+    for name, value in content.items():
+        if name not in KEYS:
+            close = get_close_matches(name, KEYS, 1)
+            meant = f"did you mean {close[0]}?" if close else f"expected {', '.join(KEYS)}"
+            raise InputError(f"{path}: {shown(name)} is no key of an axis; {meant}")
+        found[name] = KEYS[name].read(value, f"{path}: {name}")
+    if "reference" in found:
+        found["reference"] = str(path.parent / found["reference"])
+    require_consistent(found, f"{path}: ")
+    return found
+
+
+def require_consistent(values: Mapping[str, Any], place: str = "") -> None:
+    """Refuse two references at once, and numbers of a reference that are not as many as its frequencies.
+
+    Raises
+    ------
+    InputError
+        The sentence begins with ``place``.
+    """
+    for name in SINUSOIDS:
+        if name in values and "reference" in values:
+            raise InputError(
+                f"{place}{name} belongs to a reference of sinusoids; found reference {shown(values['reference'])} too"
+            )
+    counts = {name: len(values[name]) for name in ("reference-hz", "amplitude", "phase") if name in values}
+    if len(set(counts.values())) > 1:
+        said = ", ".join(f"{name} {count}" for name, count in counts.items())
+        raise InputError(f"{place}these are not as many: {said}; expected one of each for every frequency")
+
+
+def axis_text(values: Mapping[str, Any], notes: Mapping[str, str]) -> str:
+    """The text of an axis.toml with a comment at every key.
+
+    Parameters
+    ----------
+    values
+        Key -> value, see :meth:`Key.read`. The other keys stand there as examples behind a #.
+    notes
+        Key -> what is said of its value in a comment of its own.
+    """
+    parts = [HEAD]
+    for name, key in KEYS.items():
+        comments = [key.comment] + ([notes[name]] if name in notes else [])
+        lines = [line for text in comments for line in textwrap.wrap(text, WIDTH, break_on_hyphens=False)]
+        value = f"{name} = {_toml(values[name])}" if name in values else f"# {name} = {key.example}"
+        parts.append("\n".join([*(f"# {line}" for line in lines), value]))
+    return "\n\n".join(parts) + "\n"
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(repr, value))}]"
+    if not isinstance(value, str):
+        return repr(value)
+    try:
+        value.encode("utf-8")
+    except UnicodeEncodeError:
+        raise InputError(f"{shown(value)} is not UTF-8; expected a name that a TOML file can hold") from None
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
