@@ -114,9 +114,8 @@ def test_the_run_is_that_of_simulate_with_the_true_plant(extended_design: Design
     )
     np.testing.assert_allclose(run.control, expected.control, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(run.outputs["output"], expected.outputs["output"], rtol=1e-9, atol=1e-9)
-    assert "gain times 1.3 and the frequencies of its modes times 0.9 and a dead time of 0.02 s instead of 0.0081 s" in (
-        true_plant_text(state.true, explorer.start.true)
-    )
+    said = "gain times 1.3 and the frequencies of its modes times 0.9 and a dead time of 0.02 s instead of 0.0081 s"
+    assert said in true_plant_text(state.true, explorer.start.true)
 
 
 def test_the_shaded_times_are_those_in_which_the_control_is_beyond_a_limit(explorer: Explorer) -> None:
