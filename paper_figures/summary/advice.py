@@ -220,12 +220,13 @@ def _assumed(axis: pd.DataFrame | str | None, signals: Signals) -> Iterator[str]
 
 def _to_come(found: Found) -> Iterator[str]:
     """What a refit has not yet come to."""
-    missing = [name for name in DESIGNS if name not in found.designs]
-    if "design" in missing and found.axis is None:
-        yield "This is the fit alone; designs and runs follow."
-    elif missing and not isinstance(found.axis, str):
-        yield "Designs and runs follow."
-    elif found.design("design") is not None:
-        rest = [FOLLOWS[name] for name in TABLES if name not in found.tables]
-        if rest:
-            yield f"Still to come: {', '.join(rest)}."
+    if isinstance(found.axis, str):
+        return
+    if "design" not in found.designs:
+        yield f"{'This is the fit alone; designs' if found.axis is None else 'Designs'} and runs follow."
+        return
+    rest = [said for name, said in DESIGNS.items() if name not in found.designs]
+    if found.design("design") is not None:
+        rest += [FOLLOWS[name] for name in TABLES if name not in found.tables]
+    if rest:
+        yield f"{'; '.join(rest)}."
