@@ -47,6 +47,8 @@ def files_of_command(command: Sequence[str]) -> list[str]:
     needed = [*files_of(f"{room}.__main__"), *found, *own]
     if name == "draw":
         needed += files_of(f"{FIGURES.replace('/', '.')}.{words[1]}")
+    if (room, name) == ("paper_figures", "axis"):
+        needed += files_of(f"paper_figures.axis_figures.{words[1]}")
     if name == "claims":
         needed += [path.relative_to(ROOT).as_posix() for path in (ROOT / CHECKS).glob("*.py")]
     return closure(needed)

@@ -10,6 +10,7 @@ import click
 
 from experiments.options import DESIGN, LIMIT_PAIR, asked_limits
 from experiments.pair_options import PairCommand
+from identification.base.axis_option import AXIS
 from identification.base.errors import InputError
 from identification.base.path_types import OUTPUT_FOLDER
 
@@ -19,6 +20,7 @@ WRITERS = {"c": "c_code", "json": "json_file", "fmu": "fmu"}
 
 @click.command("export", cls=PairCommand)
 @DESIGN
+@AXIS
 @click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
 @click.option("--to", type=click.Choice(list(WRITERS)), required=True, help="What is written.")
 @LIMIT_PAIR
@@ -27,7 +29,10 @@ WRITERS = {"c": "c_code", "json": "json_file", "fmu": "fmu"}
     default="corrected",
     help="none, thesis, corrected, another of DESIGN, or one of others: see the README.",
 )
-@click.option("--method", default="tustin", help="How its blocks are discretised, tustin or exact.")
+@click.option(
+    "--method",
+    help="How it is discretised, matched, tustin or exact: see the README; unless given, that of `sampled`.",
+)
 @click.option(
     "--precision",
     type=click.Choice(["double", "float"]),
@@ -42,7 +47,7 @@ def export(
     to: str,
     limit: tuple[float, ...],
     anti_windup: str,
-    method: str,
+    method: str | None,
     precision: str,
     name: str,
     output: Path,
@@ -52,6 +57,9 @@ def export(
     Beside it, NAME_test.csv is a run of `sampled` that its commands were checked against.
     """
     from design.design_file import read_design
+    from experiments.drive.choose_method import choose_method
+    from experiments.drive.judge_loop import judge_loop
+    from experiments.drive.sampled_loop import METHODS, Drive
     from experiments.export.check_run import check_run
     from experiments.export.controller import sampled_controller
     from experiments.export.names import require_name
@@ -60,14 +68,18 @@ def export(
     if precision != "double" and to != "c":
         raise InputError(f"--precision {precision} belongs to --to c; found --to {to}")
     require_name(name)
+    drive = Drive(rate, method or METHODS[0], asked_limits(limit))
     content = read_design(design)
-    controller = sampled_controller(content, anti_windup, asked_limits(limit), rate, method, name)
+    drive, judgement = choose_method(content, drive, method)
+    if not judge_loop(content, drive).stable:
+        raise InputError(judgement)
+    controller = sampled_controller(content, anti_windup, drive.limits, rate, drive.method, name)
     choices = {"precision": precision} if to == "c" else {}
     files = import_module(f"experiments.export.{WRITERS[to]}").files(
         controller, check_run(content, controller), **choices
     )
     write_whole({output / file: partial(_write, content=written) for file, written in files.items()}, [design])
-    click.echo(f"{controller.promise}; {', '.join(files)} -> {output}")
+    click.echo(f"{judgement}. {controller.promise}; {', '.join(files)} -> {output}")
 
 
 def _write(path: Path, content: str | bytes) -> None:

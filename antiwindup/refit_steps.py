@@ -7,8 +7,16 @@ from pathlib import Path
 
 from antiwindup.steps import Asked, Step, campaign_tables, csv_files, fit_steps, pictures
 
-FIGURES: dict[str, tuple[str, ...]] = {}
-"""Figures of a refit, and the files below its folder that each is drawn from."""
+FIGURES: dict[str, tuple[str, ...]] = {
+    "nyquist": (),
+    "sensitivity": (),
+    "run": ("tracking", "tracking_summary"),
+    "anti_windups": ("compare", "compare_runs"),
+    "rates": ("rates",),
+    "limits": ("limits_extended", "limits_extended_summary"),
+    "campaign": ("campaign", "campaign_summary", "campaign_distance"),
+}
+"""Figures of a refit, and the tables that each is drawn from, beside the design."""
 
 
 def refit_steps(asked: Asked) -> list[Step]:
@@ -70,9 +78,9 @@ def _figures(folder: Path) -> list[Step]:
             f"figure {name}",
             ("paper_figures", "axis", name, "--build", str(folder), "--output", str(folder / "figures")),
             pictures(folder / "figures" / name),
-            (folder / "design.json", *(folder / file for file in needed)),
+            (folder / "design.json", *csv_files(folder, *tables)),
         )
-        for name, needed in FIGURES.items()
+        for name, tables in FIGURES.items()
     ]
 
 

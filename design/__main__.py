@@ -12,62 +12,23 @@ if __name__ == "__main__":
 
 import re
 from dataclasses import replace
-from math import isfinite, tau
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from design.choices import GUARANTEES, METHODS, ROBUST_LEVEL, SECTOR
+from design.choices import METHODS, ROBUST_LEVEL
+from design.options import DESIGN, OUTPUT, asked_frequencies, corrected_options, frequency_options
 from identification.base.axis_option import AXIS
-from identification.base.command_line import CommandGroup, together
+from identification.base.command_line import CommandGroup
 from identification.base.digits import lower_end, upper_end
 from identification.base.errors import InputError
 from identification.base.files import require_writable, write_whole
-from identification.base.path_types import FIGURE_FILE, INPUT_FILE, OUTPUT_FILE
+from identification.base.path_types import FIGURE_FILE
 
 if TYPE_CHECKING:
     from design.design_file import Design
-
-OUTPUT = click.option("--output", type=OUTPUT_FILE, required=True, help="design.json to write.")
-DESIGN = click.argument("design", type=INPUT_FILE)
-frequency_options = together(
-    click.option(
-        "--reference-hz",
-        "hertz",
-        type=float,
-        multiple=True,
-        help="Frequency of the reference in Hz; once for each sinusoid; 0 is a constant.",
-    ),
-    click.option("--reference-omega", "omegas", type=float, multiple=True, help="The same in rad/s."),
-)
-"""Frequencies of the reference, the same for both designs."""
-corrected_options = together(
-    click.option(
-        "--recovery",
-        type=float,
-        help="Corrected anti-windup: most time in s for the slowest mode of theta1~ to fall to 1 %; y_d keeps "
-        "the plant's own modes. That of the loop itself unless given.",
-    ),
-    click.option(
-        "--guarantee",
-        type=click.Choice(GUARANTEES),
-        help="Corrected anti-windup: global, whatever the control; robust, so for every plant within W_a; sector, up "
-        "to a control. Global unless given, or sector where the plant allows no other.",
-    ),
-    click.option(
-        "--sector",
-        type=float,
-        help="Of --guarantee sector: k of the circle criterion, below 1; |u| may reach (limit - k V)/(1 - k), V the "
-        f"control that the reference takes; {SECTOR:g} unless given.",
-    ),
-    click.option(
-        "--bandwidth",
-        type=float,
-        help="Corrected anti-windup: no pole of theta1~ beyond it, rad/s; fastest root of P and W_a unless given.",
-    ),
-)
-"""Of the corrected anti-windup, the same for both designs."""
 
 
 @click.group(cls=CommandGroup)
@@ -109,7 +70,7 @@ def delay_free(
     if (epsilon is None) != integral_action:
         found = "both are given" if integral_action else "none is given"
         raise InputError(f"of --epsilon and --integral-action {found}; expected one of them")
-    frequencies = _frequencies(hertz, omegas)
+    frequencies = asked_frequencies(hertz, omegas)
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
     design = design_delay_free(given, frequencies, epsilon, recovery, sector, bandwidth, guarantee)
@@ -177,7 +138,7 @@ def extended(
 
     if len(e) != len(f):
         raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected as many")
-    frequencies = _frequencies(hertz, omegas)
+    frequencies = asked_frequencies(hertz, omegas)
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
     design = design_extended(
@@ -253,15 +214,6 @@ def audit_command(design: Path, windup: float, figure: Path | None) -> None:
 
         write_whole({figure: figure_writer(plot_audit(content))}, inputs=[design])
     click.echo(said)
-
-
-def _frequencies(hertz: tuple[float, ...], omegas: tuple[float, ...]) -> tuple[float, ...]:
-    """All frequencies of the reference in rad/s; raises InputError when there is none."""
-    if not hertz and not omegas:
-        raise InputError(
-            "no frequency of the reference is given; expected --reference-hz or --reference-omega, 0 for a constant"
-        )
-    return *(tau * frequency for frequency in hertz), *omegas
 
 
 def _coefficients(text: str, option: str) -> list[float]:

@@ -23,7 +23,8 @@ from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
 MULTIPLE = 1.2  # of the control that the reference needs: the limit unless given
-PERIODS = 4  # for each upset
+PERIODS, MOST_PERIODS = 4, 40  # for each upset; more than the least where
+RECOVERIES = 3  # times the corrected anti-windup's recovery time take longer
 PULSE = 0.1  # of a period: how long the disturbance acts
 SAMPLES = 2000  # a period
 KEPT = 8  # of the samples every so many are written
@@ -58,9 +59,9 @@ def comparison_tables(
     Returns
     -------
     dict
-        ``compare``: for every anti-windup two rows. The upset ``start`` begins at rest, ``pulse`` four periods later:
-        half the distance of the limits is added to the plant's input for a tenth of a period. Each counts for four
-        periods, and times count from its beginning.
+        ``compare``: for every anti-windup two rows. The upset ``start`` begins at rest, ``pulse`` some periods later:
+        half the distance of the limits is added to the plant's input for a tenth of a period. Each counts for as
+        many periods, four or what the corrected anti-windup takes, and times count from its beginning.
 
         run, upset, refused
             The last is the sentence where the design has no such anti-windup; the cells after it are empty then.
@@ -69,7 +70,7 @@ def comparison_tables(
             the anti-windup is not of this form.
         recovery_s
             When |y - y0| has fallen to 1 % of the reference's amplitude for good, y0 being the output without
-            saturation and under the same disturbance; empty: not within the four periods.
+            saturation and under the same disturbance; empty: not within these periods.
         last_saturation_s, crossings
             Of the limits; the first is empty where u is saturated at the end.
         peak_error, from_s, least_peak_error
@@ -77,8 +78,9 @@ def comparison_tables(
             betters; the last for the start only, and for a periodic reference.
         largest_control, last_error
             The greatest |u| over the larger limit, and the greatest |r - y| of the last period.
-        lower_limit, limit, required
-            The second is the upper limit, the last the most that the control of perfect tracking reaches.
+        lower_limit, limit, amplitude, required
+            The second is the upper limit, the third the sum of the reference's amplitudes, the last the most that the
+            control of perfect tracking reaches.
 
         ``compare_runs``: time_s, reference, output_unsaturated, and for every run NAME output_NAME and control_NAME.
 
@@ -95,8 +97,10 @@ def comparison_tables(
     if not np.isfinite(high - low):
         raise InputError(f"the limits are {low:g} and {high:g}; expected finite ones")
     period = _period(design, reference)
-    time_s = np.linspace(0.0, 2 * PERIODS * period, 2 * PERIODS * SAMPLES + 1)
-    begin = PERIODS * period
+    recovery_s = RECOVERIES * design.corrected.judgement.recovery_s
+    count = min(max(PERIODS, int(np.ceil(recovery_s / period)) + 1), MOST_PERIODS)
+    time_s = np.linspace(0.0, 2 * count * period, 2 * count * SAMPLES + 1)
+    begin = count * period
     disturbances = Disturbances(input=steps([((high - low) / 2, begin), (0.0, begin + PULSE * period)]))
 
     kinds, refused = anti_windups(design)
@@ -114,13 +118,13 @@ def comparison_tables(
     rows = []
     for name in ("none", *design.anti_windup, *OTHERS):
         known: dict[str, object] = {"lower_limit": low, "limit": high, "required": required}
-        known |= {"refused": refused.get(name)}
+        known |= {"amplitude": reference.amplitude, "refused": refused.get(name)}
         if name in kinds:
             known |= _promised(design, kinds[name], true)
         for upset, start_s in (("start", 0.0), ("pulse", begin)):
             row: dict[str, object] = {"run": name, "upset": upset} | known
             if name in runs:
-                row |= _row(runs[name], unsaturated, start_s, period, from_s, max(-low, high), band)
+                row |= _row(runs[name], unsaturated, start_s, begin, period, from_s, max(-low, high), band)
                 row |= {"least_peak_error": least if upset == "start" else np.nan}
             rows.append(row)
     series = {"time_s": time_s, "reference": reference(time_s), "output_unsaturated": unsaturated}
@@ -170,9 +174,16 @@ def _least_error(
 
 
 def _row(
-    run: Run, unsaturated: np.ndarray, start_s: float, period: float, from_s: float, limit: float, band: float
+    run: Run,
+    unsaturated: np.ndarray,
+    start_s: float,
+    length: float,
+    period: float,
+    from_s: float,
+    limit: float,
+    band: float,
 ) -> dict[str, object]:
-    end_s = start_s + PERIODS * period
+    end_s = start_s + length
     counts = (run.time_s >= start_s) & (run.time_s <= end_s)
     time_s, control = run.time_s[counts] - start_s, run.control[counts]
     output, error = run.outputs["output"][counts], np.abs(run.outputs["error"][counts])

@@ -10,17 +10,16 @@ import pandas as pd
 
 from design.blocks.block import fastest_root
 from design.design_file import Design
-from experiments.drive.difference_equations import METHODS
-from experiments.drive.sampled_loop import Drive, simulate_sampled
-from experiments.engine.simulate import DivergenceError
-from experiments.runs.compare_anti_windups import SETTLED, loops, run_all, span
+from experiments.drive.judge_loop import judge_loop
+from experiments.drive.sampled_loop import METHODS, Drive, simulate_sampled
+from experiments.runs.compare_anti_windups import SETTLED, loops, run_all, span, usual_periods
 from experiments.runs.metrics import over_last, settling_time
 from experiments.runs.references import Reference
+from identification.base.errors import InputError
 
 NAMES = ("none", "corrected")
 SAMPLES = (2, 4, 8, 16, 32, 64)  # in a period of the fastest root of the controller
-PERIODS = 6
-ROWS = 2000  # a period, of the run in continuous time
+ROWS = 1000  # a period, of the run in continuous time
 
 Tick = Callable[[], object]
 
@@ -41,7 +40,7 @@ def rates_tables(
     input_delay_s: float = 0.0,
     tick: Tick = lambda: None,
 ) -> dict[str, pd.DataFrame]:
-    """Run a design from rest in continuous time and on a computer at several rates, by both methods.
+    """Run a design from rest in continuous time and on a computer at several rates, by every method.
 
     Parameters
     ----------
@@ -62,11 +61,13 @@ def rates_tables(
     Returns
     -------
     dict
-        ``rates``, see :func:`rows_of`, and in every row asked_hz (empty: none), amplitude (of the reference), quantum,
-        lower_limit and limit (the upper one).
+        ``rates``, see :func:`rows_of`, with stable (1 or 0: whether the linear loop is, see
+        :func:`experiments.drive.judge_loop.judge_loop`), and in every row asked_hz (empty: none), amplitude (of the
+        reference), quantum, lower_limit and limit (the upper one).
     """
     period, low_high = span(design, reference), dict(zip(("lower_limit", "limit"), limits, strict=True))
-    time_s = np.linspace(0.0, PERIODS * period, PERIODS * ROWS + 1)
+    count = usual_periods(design, reference)
+    time_s = np.linspace(0.0, count * period, count * ROWS + 1)
     rates = sorted({*usual_rates(design).values(), *([rate] if rate else [])})
     rows = []
     for name, run in run_all(loops(design, reference, NAMES), limits, time_s, rate_limit).items():
@@ -78,8 +79,10 @@ def rates_tables(
     drives = [Drive(each, method, limits, quantum, rate_limit, input_delay_s) for method in METHODS for each in rates]
     for name in NAMES:
         rows += rows_of(design, reference, name, drives, time_s[-1], period, tick=tick)
+    judged = [judge_loop(design, drive, omegas=reference.frequencies).stable for drive in drives]
+    stable = [1] * len(NAMES) + [int(each) for each in judged] * len(NAMES)
     facts = {"asked_hz": rate or math.nan, "amplitude": reference.amplitude, "quantum": quantum, **low_high}
-    return {"rates": pd.DataFrame(rows).assign(**facts)}
+    return {"rates": pd.DataFrame(rows).assign(stable=stable, **facts)}
 
 
 def rows_of(
@@ -110,14 +113,14 @@ def rows_of(
     list of dict
         A row for each drive: run, method, rate_hz; steady_error, the largest of the last period, and settling_s, after
         which the error stays within 1 % of the reference's amplitude around its lasting offset (empty: never). Both are
-        empty where the loop diverges, and read at the sampling instants.
+        empty where the loop diverges or the method has no controller at the rate, and read at the sampling instants.
     """
     rows: list[dict[str, object]] = []
     for drive in drives:
         row: dict[str, object] = {"run": name, "method": drive.method, "rate_hz": drive.rate_hz}
         try:
             run = simulate_sampled(design, reference, name, drive, until_s, form=form)
-        except DivergenceError:
+        except InputError:  # among them DivergenceError
             row |= {"steady_error": math.nan, "settling_s": math.nan}
         else:
             row |= numbers_of(run.time_s, run.error, span_s, reference)
@@ -133,3 +136,28 @@ def numbers_of(time_s: np.ndarray, error: np.ndarray, span_s: float, reference: 
         "steady_error": abs(offset) + ripple,
         "settling_s": settling_time(time_s, error - offset, SETTLED * reference.amplitude),
     }
+
+
+def lowest_rate(table: pd.DataFrame, run: str, method: str) -> float:
+    """The lowest rate in Hz from which on, as far as was tried, a computer does what continuous time does.
+
+    Parameters
+    ----------
+    table
+        See :func:`rates_tables`.
+    run, method
+        Which rows.
+
+    Returns
+    -------
+    float
+        At it and at all higher rates of the table the linear loop is stable, and the steady error no more than that in
+        continuous time and 1 % of the reference's amplitude; NaN where there is none.
+    """
+    own = table[table["run"] == run]
+    least = float(own["steady_error"][own["method"] == "continuous"].iloc[0])
+    rows = own[own["method"] == method].sort_values("rate_hz")
+    near = ((rows["steady_error"] <= least + SETTLED * rows["amplitude"]) & (rows["stable"] == 1)).to_numpy()
+    beyond = np.flatnonzero(~near)
+    first = beyond[-1] + 1 if len(beyond) else 0
+    return float(rows["rate_hz"].iloc[first]) if first < len(rows) else math.nan

@@ -158,7 +158,11 @@ def simulate_command(
 @click.command("sampled", cls=PairCommand)
 @_run_options
 @click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
-@click.option("--method", required=True, help="How its blocks are discretised, tustin or exact.")
+@click.option(
+    "--method",
+    help="How it is discretised, matched, tustin or exact: see the README; unless given, that of least steady error "
+    "among those with a stable linear loop.",
+)
 @click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels in its unit; 0, no levels.")
 @click.option("--input-delay", type=float, default=0.0, help="From sample to actuator in seconds.")
 @click.option(
@@ -178,7 +182,7 @@ def sampled_command(
     anti_windup: str,
     until: float,
     rate: float,
-    method: str,
+    method: str | None,
     quantum: float,
     rate_limit: float,
     input_delay: float,
@@ -204,13 +208,15 @@ def sampled_command(
     from design.design_file import read_design
     from experiments.asked_disturbances import disturbances_of
     from experiments.asked_reference import reference_of
-    from experiments.drive.sampled_loop import Drive, simulate_sampled
+    from experiments.drive.choose_method import choose_method
+    from experiments.drive.sampled_loop import METHODS, Drive, simulate_sampled
     from experiments.runs.disturbances import UNDISTURBED
     from experiments.runs.guarantee import guarantee
+    from experiments.runs.references import Reference
     from experiments.runs.region import require_within_region
     from experiments.runs.sector_promise import steady_control, verdict
 
-    drive = Drive(rate, method, asked_limits(limit), quantum, rate_limit, input_delay, resolution)
+    drive = Drive(rate, method or METHODS[0], asked_limits(limit), quantum, rate_limit, input_delay, resolution)
     _require_few_rows(until * rate)
     inputs = _inputs(design, plant, reference["reference"])
     require_writable(output, *([] if figure is None else [figure]), inputs=inputs)
@@ -220,6 +226,9 @@ def sampled_command(
     disturbances = disturbances_of(until, input_disturbance, output_disturbance, noise, seed)
     true = None if plant is None else asked_model(plant).plant
     require_within_region(true or content.loop_plant, asked, drive.limits)
+    omegas = asked.frequencies if isinstance(asked, Reference) else None
+    drive, judgement = choose_method(content, drive, method, true, omegas, form)
+    click.echo(judgement)
     with tqdm(total=until * rate, desc="sampled", bar_format=SHARE, disable=None, leave=False) as bar:
         run = simulate_sampled(content, asked, kind, drive, until, true, bar.update, disturbances, form)
     low, high = drive.limits

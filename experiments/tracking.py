@@ -10,14 +10,22 @@ import pandas as pd
 
 from design.design_file import Design
 from experiments.engine.simulate import limit_pair, simulate
-from experiments.runs.compare_anti_windups import loops, run_all, span, tracking_summary, tracking_table, verdicts
+from experiments.runs.compare_anti_windups import (
+    loops,
+    run_all,
+    span,
+    tracking_summary,
+    tracking_table,
+    usual_periods,
+    verdicts,
+)
 from experiments.runs.references import Reference, SampledReference
 from experiments.runs.region import longest_run, require_within_region
 from experiments.runs.sector_promise import steady_control
 from experiments.runs.steady_control import steady_constant
 
-PERIODS = 5
-SAMPLES = 2000  # a period
+PERIODS = 5  # of samples
+SAMPLES, LEAST, ROWS = 2000, 100, 20_000  # a period at most, a period at least, and in all
 
 
 def tracking_tables(
@@ -27,8 +35,8 @@ def tracking_tables(
     names: Sequence[str] = ("none", "corrected"),
     *,
     rate_limit: float = math.inf,
-    periods: int = PERIODS,
-    samples: int = SAMPLES,
+    periods: int | None = None,
+    samples: int | None = None,
 ) -> dict[str, pd.DataFrame]:
     """Run a design from rest with several anti-windups.
 
@@ -45,7 +53,8 @@ def tracking_tables(
     rate_limit
         The most that the actuator's output changes in a second, in its unit; the controller does not know it.
     periods, samples
-        Length of a run in periods, and its samples in each.
+        Length of a run in periods, :func:`experiments.runs.compare_anti_windups.usual_periods` unless given, and its
+        samples in each.
 
     Returns
     -------
@@ -64,7 +73,9 @@ def tracking_tables(
     pair, plant = limit_pair(limits), design.loop_plant
     require_within_region(plant, reference, pair)
     until, span_s = _length(design, reference, periods)
+    count = until / span_s
     until = min(until, longest_run(plant))
+    samples = samples or max(min(SAMPLES, round(ROWS / count)), LEAST)
     time_s = np.linspace(0.0, until, max(round(until / span_s * samples), 2) + 1)
     every = loops(design, reference, names)
     runs = run_all(every, pair, time_s, rate_limit)
@@ -83,12 +94,12 @@ def tracking_tables(
     }
 
 
-def _length(design: Design, reference: Reference | SampledReference, periods: int) -> tuple[float, float]:
+def _length(design: Design, reference: Reference | SampledReference, periods: int | None) -> tuple[float, float]:
     """How long a run lasts, and how long its last period, in seconds."""
     if isinstance(reference, SampledReference):
-        return float(reference.time_s[-1]), float(reference.time_s[-1]) / periods
+        return float(reference.time_s[-1]), float(reference.time_s[-1]) / PERIODS
     span_s = span(design, reference)
-    return periods * span_s, span_s
+    return (periods or usual_periods(design, reference)) * span_s, span_s
 
 
 def _required(design: Design, reference: Reference | SampledReference) -> float:

@@ -47,6 +47,32 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
     style.write(files)
 
 
+@main.command("axis")
+@click.argument("names", metavar="NAME...", nargs=-1, required=True)
+@click.option(
+    "--build",
+    type=INPUT,
+    required=True,
+    help="Folder of design.json, with the tables in its folder results.",
+)
+@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write to.")
+def axis_command(names: tuple[str, ...], build: Path, output: Path) -> None:
+    """Draw NAME..., such as run or rates, of a refit: each as PDF, SVG and PNG with its caption as text."""
+    from design.design_file import read_design
+    from paper_figures.axis_figures.registry import axis_figure
+    from paper_figures.look import style
+    from paper_figures.result_tables import read_table, sentences_of
+
+    design = read_design(build / "design.json", "extended")
+    files: dict[Path, bytes] = {}
+    for name in names:
+        module = axis_figure(name)
+        tables = {table: read_table(build / "results" / f"{table}.csv", name) for table in module.TABLES}
+        with sentences_of(tables, build / "results", name, build / "design.json"):
+            files |= style.rendered(module.draw(design, tables), output, name, module.caption(design, tables))
+    style.write(files)
+
+
 @main.command("summary")
 @click.argument("model", type=INPUT_FILE)
 @click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)
@@ -57,21 +83,21 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
     help="Existing folder of the designs, with the tables in its folder results; to write to, too.",
 )
 def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
-    """Sum up MODEL, fitted to SWEEP files, its designs, and what was refused: summary.pdf, .svg, .png and .txt."""
+    """Say what to do with MODEL, fitted to SWEEP files, and what not, and why: summary.pdf, .svg, .png and .txt."""
     from identification.model.model_file import read_model
     from identification.sweeps.as_fitted import as_fitted
     from identification.sweeps.read_sweeps import read_sweeps
     from paper_figures.look import style
     from paper_figures.result_tables import sentences_of
     from paper_figures.summary import page
-    from paper_figures.summary.build_folder import read_build, summaries
+    from paper_figures.summary.build_folder import read_refit
     from paper_figures.summary.words import summarise
 
     identified = read_model(model)
     tests = as_fitted(identified, read_sweeps(sweeps))
-    designs, outcomes = read_build(build, "summary")
-    with sentences_of(summaries(outcomes), build / "results", "summary", model):
-        said = summarise(identified, tests, designs, outcomes)
+    found = read_refit(build)
+    with sentences_of(found.files, build / "results", "summary", model):
+        said = summarise(identified, tests, found)
         files = style.rendered(page.draw(said, identified, tests), build, "summary", said.text())
     style.write(files)
     click.echo(f"{len(tests)} test{'s' if len(tests) > 1 else ''} -> {build / 'summary.pdf'}")
@@ -96,6 +122,8 @@ def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
     names = ", ".join(test.name + (" (synthetic)" if test.synthetic else "") for test in tests)
     caption = f"Magnitude and phase of {names} and of the model {model.name}, and their distance under the bound W_a."
     used = as_fitted(identified, tests)
+    if identified.fit is not None and identified.fit.covariance is not None:
+        caption += " The band around the model is its 95 % confidence interval, at each frequency by itself."
     if any(test.left_out for test in used):
         caption += " Lines that the fit left out are in another colour."
     if any(test.conjugated for test in used):
@@ -117,8 +145,8 @@ def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
 def report_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
     """Put all that was made for MODEL (a model.json, table or implied) and SWEEP files on one page of HTML."""
     from paper_figures.result_tables import sentences_of
-    from paper_figures.summary.build_folder import read_build, summaries
     from paper_figures.thesis.figure_registry import figure_module, figure_names
+    from paper_figures.thesis.report.build_folder import read_build, summaries
     from paper_figures.thesis.report.content import report_content
     from paper_figures.thesis.report.html import write_report
     from paper_figures.thesis.report.inputs import read_inputs

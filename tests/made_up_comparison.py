@@ -18,21 +18,14 @@ def made_up_comparison() -> dict[str, pd.DataFrame]:
                 "upset": upset,
                 "lower_limit": -12.5,
                 "limit": 12.5,
+                "amplitude": 40.0,
                 "refused": np.nan,
                 "guarantee": guarantee,
             }
             row |= {"recovery_s": np.nan if run == "thesis" else scale * 5.25 / k, "largest_control": scale * 3.0 * k}
             row |= {"f": np.nan if run == "none" else 0.125 * k, "from_s": 1.375}
             rows.append(row | {"least_peak_error": 2.625 if upset == "start" else np.nan})
-        rows.append(
-            {
-                "run": "internal-model",
-                "upset": upset,
-                "lower_limit": -12.5,
-                "limit": 12.5,
-                "refused": "the plant integrates",
-            }
-        )
+        rows.append({"run": "internal-model", "upset": upset, "refused": "the plant integrates"})
     time_s = np.linspace(0.0, 32.0, 321)
     runs = {"time_s": time_s, "reference": 40 * np.sin(1.5 * time_s), "output_unsaturated": 40 * np.sin(1.5 * time_s)}
     for k, run in enumerate(GUARANTEES, 1):

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import factorial
 
 import numpy as np
-from flint import acb_mat, arb, arb_poly
+from flint import acb, arb, arb_poly
 
 from design.blocks.ball import decided, from_roots, number, polynomial_roots
 from design.blocks.block import Block, plant_block
-from design.chapters_3_4.tracking import powers
+from design.chapters_3_4.tracking import Taylor, interpolating
 from design.design_file import Design
 from design.parameters import ExtendedParameters
 from identification.base.arrays import Complex, Real
@@ -70,7 +71,7 @@ class CoprimeForm:
         return np.asarray(self.forward(s) / (1 - self.rest(s) - self.through(s) * late))
 
 
-def coprime_form(K: Block, T: Block, anchors: tuple[complex, ...], a: float) -> CoprimeForm:
+def coprime_form(K: Block, T: Block, anchors: tuple[complex, ...], a: float, late: Taylor | None = None) -> CoprimeForm:
     """The realisation of C = K/(1 - T) without hidden modes.
 
     Parameters
@@ -84,6 +85,9 @@ def coprime_form(K: Block, T: Block, anchors: tuple[complex, ...], a: float) -> 
         The plant's poles in Re s >= 0, rad/s.
     a
         T has as many poles at -a as there are anchors, rad/s.
+    late
+        Of another dead time than exp(-h s), such as one in samples, the Taylor coefficients at a point; T is then
+        given without it, and ``through`` may be improper.
 
     Raises
     ------
@@ -94,29 +98,25 @@ def coprime_form(K: Block, T: Block, anchors: tuple[complex, ...], a: float) -> 
     shared = Block(1.0, (complex(-a),) * q)
     forward = K * shared * Block(1.0, (), anchors)
     through = T.without_delay() * shared
-    if any(anchor in forward.poles for anchor in anchors) or through.relative_degree < 0:
+    if any(anchor in forward.poles for anchor in anchors) or (late is None and through.relative_degree < 0):
         raise InputError(
             f"the controller has not the plant's {q} poles in Re s >= 0 as zeros, or T too few poles more than zeros; "
             "expected a design that 'python -m design extended' wrote"
         )
     if not q:
         return CoprimeForm(forward, Block(0.0), through, (), (), T.delay_s)
-    E = _interpolated(anchors, T.delay_s)
+    points = [(anchor, anchors.count(anchor)) for anchor in dict.fromkeys(anchors)]
+    E = interpolating(points, late or partial(_exponential, T.delay_s), 1.0)
     rest = decided(lambda: _rest(through, anchors, a, E))
     if rest is None:
         raise InputError("the controller's stable factors are not told from rounding; expected other poles of T_so")
     return CoprimeForm(forward, rest, through, anchors, tuple(float(e) for e in reversed(E)), T.delay_s)
 
 
-def _interpolated(anchors: tuple[complex, ...], delay_s: float) -> list[arb]:
-    """The polynomial E in balls, the lowest power first."""
-    rows, values, delay = [], [], arb(delay_s)
-    for anchor in dict.fromkeys(anchors):
-        for j in range(anchors.count(anchor)):
-            rows.append(powers(number(anchor), j, len(anchors)))
-            values.append([(-delay * number(anchor)).exp() * (-delay) ** j / factorial(j)])
-    found = acb_mat(rows).solve(acb_mat(values))
-    return [found[k, 0].real for k in range(len(anchors))]
+def _exponential(delay_s: float, point: acb, terms: int) -> list[acb]:
+    """The first Taylor coefficients of exp(-h s) at a point."""
+    delay = arb(delay_s)
+    return [(-delay * point).exp() * (-delay) ** j / factorial(j) for j in range(terms)]
 
 
 def _rest(through: Block, anchors: tuple[complex, ...], a: float, E: list[arb]) -> Block:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import comb, factorial
 
 import numpy as np
@@ -16,6 +17,9 @@ from design.chapters_3_4.interpolate_Q import require_each_once
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
+
+Taylor = Callable[[acb, int], list[acb]]
+"""From a point and a number of terms to the Taylor coefficients of a function there, the value first."""
 
 
 @dataclass(frozen=True)
@@ -124,33 +128,63 @@ def outer_part(wanted: TrackingConditions, poles: Sequence[complex]) -> Block:
     is solved in ball arithmetic, so that no accuracy is lost however far the points lie apart. The zeros of n are
     rounded to doubles at the end.
     """
-    solution = decided(lambda: _numerator(wanted, poles))
-    if solution is None:
+    unit = 2.0 ** round(float(np.log2(np.mean(np.abs(poles)))))
+    n = decided(lambda: factored(interpolating(wanted.points, partial(_target, wanted, poles), unit), unit))
+    if n is None:
         raise InputError("the numerator of T_so could not be told from rounding; expected frequencies farther apart")
-    gain, zeros = solution
-    return Block(gain, zeros + (0j,) * wanted.zeros_at_zero, tuple(poles))
+    return Block(n.gain, n.zeros + (0j,) * wanted.zeros_at_zero, tuple(poles))
 
 
-def _numerator(wanted: TrackingConditions, poles: Sequence[complex]) -> tuple[float, tuple[complex, ...]]:
-    rows, values = [], []
-    unit = arb(2) ** round(float(np.log2(np.mean(np.abs(poles)))))
-    for point, multiplicity in wanted.points:
-        z = number(point) / unit
-        series = _target(wanted, poles, number(point), multiplicity)
+def interpolating(points: Sequence[tuple[complex, int]], taylor: Taylor, unit: float) -> list[arb]:
+    """The real polynomial of least degree with given Taylor coefficients at points.
+
+    Parameters
+    ----------
+    points
+        Each with its multiplicity; conjugate points are both named.
+    taylor
+        Of what it is to meet at the points.
+    unit
+        The polynomial is one in s/unit.
+
+    Returns
+    -------
+    list
+        Its coefficients, as many as the multiplicities add up to, the lowest power first.
+    """
+    count = sum(multiplicity for _, multiplicity in points)
+    rows, values, scale = [], [], arb(unit)
+    for point, multiplicity in points:
+        series = taylor(number(point), multiplicity)
         for j in range(multiplicity):
-            rows.append(powers(z, j, wanted.count))
-            values.append([series[j] * unit**j])
+            rows.append(powers(number(point) / scale, j, count))
+            values.append([series[j] * scale**j])
     found = acb_mat(rows).solve(acb_mat(values))
-    coefficients = [found[k, 0].real for k in range(wanted.count)]
-    while len(coefficients) > 1 and coefficients[-1].contains(0):
-        coefficients.pop()  # n is of lower degree
-    zeros = tuple(complex(root * unit) for root in polynomial_roots(arb_poly(coefficients)))
-    return float(coefficients[-1] / unit ** (len(coefficients) - 1)), zeros
+    return [found[k, 0].real for k in range(count)]
+
+
+def factored(coefficients: Sequence[arb], unit: float) -> Block:
+    """The polynomial in s/unit with these coefficients, the lowest power first, as a block."""
+    known = list(coefficients)
+    while len(known) > 1 and known[-1].contains(0):
+        known.pop()  # it is of lower degree
+    zeros = tuple(complex(root * arb(unit)) for root in polynomial_roots(arb_poly(known)))
+    return Block(float(known[-1] / arb(unit) ** (len(known) - 1)), zeros)
 
 
 def powers(z: acb, j: int, count: int) -> list[acb]:
     """The j-th Taylor coefficient at z of 1, x, x^2, ..."""
     return [comb(k, j) * z ** (k - j) if k >= j else acb(0) for k in range(count)]
+
+
+def taylor_times(series: list[acb], block: Block, point: acb) -> list[acb]:
+    """The first Taylor coefficients at a point of a function times a block without dead time, from the function's."""
+    series = [arb(block.gain) * term for term in series]
+    for root in block.zeros:
+        series = _times(series, point - number(root))
+    for root in block.poles:
+        series = _over(series, point - number(root))
+    return series
 
 
 def _target(wanted: TrackingConditions, poles: Sequence[complex], point: acb, terms: int) -> list[acb]:
@@ -159,11 +193,8 @@ def _target(wanted: TrackingConditions, poles: Sequence[complex], point: acb, te
     delay = arb(T_si.delay_s)
     late = (delay * point).exp() / arb(T_si.gain)
     series = [late * delay**k / factorial(k) for k in range(terms)]
-    for root in (*poles, *T_si.poles):
-        series = _times(series, point - number(root))
-    for root in (*T_si.zeros, *(0j,) * wanted.zeros_at_zero):
-        series = _over(series, point - number(root))
-    return series
+    inverse = Block(1.0, (*poles, *T_si.poles), (*T_si.zeros, *(0j,) * wanted.zeros_at_zero))
+    return taylor_times(series, inverse, point)
 
 
 def _times(series: list[acb], value: acb) -> list[acb]:

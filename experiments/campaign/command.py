@@ -33,7 +33,11 @@ plant_options = together(
 @plant_options
 @AXIS
 @LIMIT_PAIR
-@click.option("--periods", type=int, default=5, help="Length of a run in periods of the reference.")
+@click.option(
+    "--periods",
+    type=int,
+    help="Length of a run in periods of the reference; 5 unless given, or as many as the loop takes to settle.",
+)
 @sinusoid_options
 def campaign_command(
     design: Path,
@@ -43,7 +47,7 @@ def campaign_command(
     output: Path,
     anew: bool,
     limit: tuple[float, ...],
-    periods: int,
+    periods: int | None,
     **reference: Any,
 ) -> None:
     """Run DESIGN with plants drawn inside W_a: three rows a plant, none, thesis and corrected.
@@ -53,10 +57,12 @@ def campaign_command(
     from design.design_file import read_design
     from experiments.asked_reference import sinusoids
     from experiments.campaign.run_campaign import run_campaign
+    from experiments.runs.compare_anti_windups import usual_periods
 
     limits = asked_limits(limit)
-    if not 1 <= periods <= MOST_PERIODS:
+    if periods is not None and not 1 <= periods <= MOST_PERIODS:
         raise InputError(f"--periods is {periods}; expected 1 to {MOST_PERIODS}")
     content = read_design(design)
     asked = sinusoids(content, **reference)
-    run_campaign(content, design, plants, seed, asked, limits, periods, scheduler, output, anew)
+    length = periods or usual_periods(content, asked)
+    run_campaign(content, design, plants, seed, asked, limits, length, scheduler, output, anew)

@@ -60,8 +60,12 @@ def run_here(campaign: Campaign, chunks: Sequence[Chunk]) -> Done:
             raise InputError(
                 "a process that ran plants was killed; the same command goes on from what is done"
             ) from None
-        finally:
+        except InputError:
+            pool.shutdown(cancel_futures=True)  # a process that is itself a child would wait for its own for ever
+            raise
+        except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
+            raise
 
 
 def run_on_cluster(campaign: Campaign, chunks: Sequence[Chunk], address: str) -> Done:

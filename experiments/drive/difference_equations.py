@@ -158,8 +158,9 @@ def sample_memory(form: CoprimeForm, sample_time_s: float, method: str) -> Sampl
     if method == "tustin":
         sampled = sample_block(system, [0.0, 0.0], sample_time_s, method)
         taps = np.zeros(whole + 2)
+        one, last = (_against_lines(A, b, sample_time_s, share) for share in (1.0, rest))
         for j, row in enumerate(rows):
-            near, far = _against_lines(A, b, sample_time_s, 1.0 if j < whole else rest)
+            near, far = one if j < whole else last
             taps[j : j + 2] += row @ near, row @ far
         table = np.zeros((2, whole + 2))
         table[0, 0], table[1] = 1.0, taps

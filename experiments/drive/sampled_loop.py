@@ -14,7 +14,9 @@ from design.blocks.state_space import StateSpace, block_diagonal, realize
 from design.chapters_3_4.realisation import realised
 from design.design_file import Asked, Design
 from experiments.drive.compiled_steps import Actuator, Series, run
-from experiments.drive.difference_equations import METHODS, SampledBlock, held, sample_block, sample_memory, split
+from experiments.drive.difference_equations import METHODS as RULES
+from experiments.drive.difference_equations import SampledBlock, held, sample_block, sample_memory, split
+from experiments.drive.matched_controller import matched_controller
 from experiments.engine.simulate import MOST_STEPS, DivergenceError, limit_pair
 from experiments.engine.watched import Tick, watched
 from experiments.runs.disturbances import UNDISTURBED, Disturbances, Signal
@@ -22,6 +24,8 @@ from experiments.runs.references import Reference, SampledReference
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
+METHODS = ("matched", *RULES)
+"""How the controller is discretised."""
 FORMS = ("coprime", "thesis")
 """How the controller is realised."""
 MOST_LEVELS = 2.0**53  # which are still whole numbers
@@ -37,7 +41,8 @@ class Drive:
     rate_hz
         1/T_s, samples a second.
     method
-        How each block of the controller is discretised, ``tustin`` or ``exact``, see
+        How the controller is discretised: ``matched``, made again for the plant with a held input, see
+        :func:`experiments.drive.matched_controller.matched_controller`, or block by block, ``tustin`` or ``exact``, see
         :func:`experiments.drive.difference_equations.sample_block`.
     limits
         (sigma_1, sigma_2) of the saturation, sigma_1 < sigma_2, either may be infinite; one number is +- that.
@@ -66,7 +71,7 @@ class Drive:
         if not 0 < self.rate_hz < math.inf:
             raise InputError(f"the rate is {self.rate_hz:g} Hz; expected a positive number")
         if self.method not in METHODS:
-            raise InputError(f"the method is '{self.method}'; expected {' or '.join(METHODS)}")
+            raise InputError(f"the method is '{self.method}'; expected {', '.join(METHODS[:-1])} or {METHODS[-1]}")
         if not 0 <= self.quantum < math.inf:
             raise InputError(f"the quantum is {self.quantum:g}; expected a number that is not negative, 0 for none")
         if not self.rate_limit > 0:
@@ -238,6 +243,23 @@ def controller_blocks(
     """What makes v of e, and of v; theta1~, and theta2 behind its dead time; what v takes of itself at once."""
     if form not in FORMS:
         raise InputError(f"the form is '{form}'; expected {' or '.join(FORMS)}")
+    if drive.method == "matched":
+        forward, feedback, theta = matched_controller(design, anti_windup, 1 / drive.rate_hz, form)
+    else:
+        forward, feedback, theta = _by_rule(design, anti_windup, drive, form)
+    around = float(feedback.at_once.sum())
+    if not (around < 1 and 1 + theta.d[0] + forward.d[0] * theta.at_once[1] / (1 - around) > 0):
+        raise InputError(
+            f"at {drive.rate_hz:g} Hz the method {drive.method} leaves the controller an algebraic loop without one "
+            "solution; expected a higher rate, or another method"
+        )
+    return forward, feedback, theta, around
+
+
+def _by_rule(
+    design: Design, anti_windup: AntiWindup | None, drive: Drive, form: str
+) -> tuple[SampledBlock, SampledBlock, SampledBlock]:
+    """The blocks of :func:`controller_blocks`, each discretised by itself."""
     delay_s, T = design.loop_plant.delay_s, 1 / drive.rate_hz
     first, second = design.controller_parts()
     compensator = (Block(0.0), Block(0.0))
@@ -249,14 +271,7 @@ def controller_blocks(
         factors = realised(design)
         first, feedback = factors.forward, sample_memory(factors, T, drive.method)
     forward = sample_block(realize(first), [0.0], T, drive.method)
-    theta = sample_block(realize(*compensator), [0.0, delay_s], T, drive.method)
-    around = float(feedback.at_once.sum())
-    if not (around < 1 and 1 + theta.d[0] + forward.d[0] * theta.at_once[1] / (1 - around) > 0):
-        raise InputError(
-            f"at {drive.rate_hz:g} Hz Tustin's rule leaves the controller an algebraic loop without one solution; "
-            "expected a higher rate, or the method exact"
-        )
-    return forward, feedback, theta, around
+    return forward, feedback, sample_block(realize(*compensator), [0.0, delay_s], T, drive.method)
 
 
 def _actuator(drive: Drive, command: np.ndarray, start: np.ndarray) -> np.ndarray:

@@ -37,7 +37,7 @@ def files(controller: SampledController, run: CheckRun, precision: str = "double
     Raises
     ------
     InputError
-        A number of the controller is beyond a float.
+        A number of the controller or of the run is beyond a float.
     """
     name, kind = controller.name, PRECISIONS[precision]
     given, seen = names(controller.signals)
@@ -85,7 +85,10 @@ def _difference(controller: SampledController, run: CheckRun, kind: type[np.floa
     """How far the commands of this precision are from those of the run, and from those rounded to it; rounded up."""
     if kind is np.float64:
         return 0.0
-    found = commands(controller, run.reference, run.measurement, kind)
+    with np.errstate(all="ignore"):
+        found = commands(controller, run.reference, run.measurement, kind)
+    if not np.isfinite(found).all():
+        raise InputError("the run of its test takes the controller beyond what a float holds; expected doubles")
     pairs = zip(found, (run.control, run.command), strict=True)
     most = max(float(np.abs(own - each).max()) for own, exact in pairs for each in (exact, exact.astype(kind)))
     return float(upper_end(most * (1 + float(np.finfo(kind).eps)), 3))

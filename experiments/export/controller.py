@@ -188,5 +188,5 @@ def _promise(given: Guarantee) -> str:
         covered = f"of runs that need a smaller sector than {sector_text(given.sector)}"
     return (
         f"In continuous time the windup ends {covered}, if the reference takes a control within the limits; of the "
-        "sampled loop nothing is proved"
+        "sampled loop beyond its limits nothing is proved"
     )

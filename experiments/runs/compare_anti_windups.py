@@ -21,6 +21,8 @@ from experiments.runs.sector_promise import judge_run
 from experiments.runs.verdict import Verdict
 
 SETTLED = 0.01  # band of the settling time, as a share of the reference's amplitude
+PERIODS, MOST_PERIODS = 5, 200
+REST = 1e-8  # of a mode is left once a loop counts as settled, or 1e-4 of several with one rate
 NAMES = ("none", "thesis", "corrected")
 """No anti-windup, (2.23), and the one with theta1~(0) = -1."""
 
@@ -42,6 +44,14 @@ def span(design: Design, reference: Reference) -> float:
     if np.isfinite(reference.period_s):
         return reference.period_s
     return 2 * design.corrected.judgement.recovery_s
+
+
+def usual_periods(design: Design, reference: Reference) -> int:
+    """How many of :func:`span` a run lasts: five, or as many as the loop takes to settle, and one more."""
+    poles = design.blocks["T_so"].poles if design.hinf is None else ()
+    slowest = min((-pole.real for pole in poles), default=math.inf) if design.hinf is None else design.hinf.decay_rate
+    settled = math.log(1 / REST) / slowest / span(design, reference)
+    return min(max(PERIODS, math.ceil(settled) + 1), MOST_PERIODS)
 
 
 def run_all(
@@ -140,8 +150,8 @@ def tracking_summary(
         run, lower_limit, limit (the upper one), required, last_saturation_s (empty: saturated to the end), settling_s
         (error within 1 % of the reference's amplitude, measured from the lasting offset of the error; empty:
         never), offset and ripple (middle and half distance of the extremes of the error over the last period),
-        relative_error_percent (largest error of the last period over the reference's amplitude; empty where that is
-        0). A run that diverges
+        asked_control (the largest |u| of the samples), relative_error_percent (largest error of the last period over
+        the reference's amplitude; empty where that is 0). A run that diverges
         has empty cells. Then, of :mod:`experiments.runs.sector_promise`, guaranteed_sector (0: nothing is guaranteed),
         needed_sector (infinite where v_s reaches a limit), largest_control (the largest |u|) and covered_control (how
         large it may be wherever v_s is; empty too where nothing is guaranteed, or any size is covered), empty for a run
@@ -162,6 +172,7 @@ def tracking_summary(
                 "settling_s": settling_time(run.time_s, error - offset, SETTLED * reference.amplitude),
                 "offset": offset,
                 "ripple": ripple,
+                "asked_control": float(np.abs(run.control).max()),
                 "relative_error_percent": 100 * (abs(offset) + ripple) / (reference.amplitude or math.nan),
             }
             | _promised(verdicts.get(name))

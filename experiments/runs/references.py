@@ -104,6 +104,12 @@ class Reference:
         return (self.offset, *(a * math.sin(phase) for a, omega, phase in parts if omega == 0))
 
     @property
+    def frequencies(self) -> tuple[float, ...]:
+        """Of what it consists of, in rad/s, each once; 0 where it has a constant or a ramp."""
+        waves = {omega for a, omega in zip(self.amplitudes, self.omegas, strict=True) if a and omega}
+        return tuple(sorted(waves | ({0.0} if any(self.constants) or self.slope else set())))
+
+    @property
     def amplitude(self) -> float:
         """The sum of the amplitudes' sizes, in the plant's output unit: the scale of every band.
 

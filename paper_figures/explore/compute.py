@@ -9,8 +9,6 @@ from functools import lru_cache
 import numpy as np
 
 from design.anti_windup.corrected_compensator import RATES, SETTLED
-from design.blocks.block import bound_block
-from design.blocks.frequency_peak import frequency_grid
 from design.chapter_2.design_delay_free import design_delay_free
 from design.chapters_3_4.chosen_poles import pairs_of
 from design.chapters_3_4.design_extended import design_extended
@@ -18,7 +16,6 @@ from design.choices import SECTOR, WEAKER
 from design.design_file import Design
 from design.parameters import DelayFreeParameters
 from design.stability.characteristic_roots import roots_right_of
-from design.stability.delay_loop import DelayLoop
 from design.stability.margins import Margins, delay_loop, margins_of
 from experiments.engine.simulate import Run
 from experiments.runs.against_none import against_none
@@ -29,40 +26,19 @@ from experiments.runs.references import Reference
 from experiments.runs.region import require_short, require_within_region
 from experiments.runs.sector_promise import judge_run
 from experiments.runs.simulate_design import PERIODS
-from identification.base.arrays import Complex, Real
+from identification.base.arrays import Real
 from identification.base.errors import InputError
 from identification.model.model_file import IdentifiedModel
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
+from paper_figures.explore.nyquist import Nyquist, nyquist_of
 from paper_figures.explore.state import Choices, State, TruePlant
 
 KEPT = 32  # designs and linear loops that are remembered
 SAMPLES = 2001  # of a run
 STEP_SAMPLES = 1001
 STEP_LENGTH = 4  # times what the loop's own transients take to fall to 1 %
-NEAR = 4.0  # modulus of L up to which discs are drawn
-FAR = 100.0  # modulus of L beyond which the curve is not drawn
-DISCS = 48
 STEP = Reference((0.0,), (0.0,), (0.0,), 1.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Nyquist:
-    """L = P C along the imaginary axis.
-
-    Parameters
-    ----------
-    model, true
-        With the model and with the true plant, shape (n,); NaN where \\|L\\| exceeds :data:`FAR`.
-    omega, centres, radii
-        Of the discs that hold L of every plant within W_a, shape (m,): in rad/s, L of the model, and \\|W_a C\\|.
-    """
-
-    model: Complex
-    true: Complex
-    omega: Real
-    centres: Complex
-    radii: Real
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +180,7 @@ class Explorer:
         return run_all({"run": loop}, state.limits, np.linspace(0.0, until_s, SAMPLES))["run"]
 
     def judged(self, state: State) -> Judged:
-        """What the audit says of a state, and the guarantee of its run, which :meth:`run` has to have made."""
+        """What the audit says of a state, and the guarantee of its run."""
         design, plant, run = self.designed(state.choices), self.true_plant(state.true), self.run(state)
         promised = "No guarantee: the run diverges"
         if np.isfinite(run.control[-1]):
@@ -231,34 +207,6 @@ class Explorer:
             return margins_of(delay_loop(design, self.true_plant(true)), design.additive_bound)
         except InputError as error:
             return str(error)
-
-
-def nyquist_of(design: Design, plant: PlantModel, loop: DelayLoop) -> Nyquist:
-    """The curves of L, and discs of W_a along what is near 0 of the model's.
-
-    Parameters
-    ----------
-    design, plant
-        The design, and the true plant.
-    loop
-        Of both.
-    """
-    W_a, model = bound_block(design.additive_bound), design.loop_plant
-    blocks = (loop.plant, delay_loop(design, model).plant, loop.forward, loop.feedback, W_a)
-    omega = frequency_grid([root for block in blocks for root in block.zeros + block.poles])
-    s = 1j * omega
-    with np.errstate(all="ignore"):  # C has poles on the axis
-        C = loop.forward(s) / (1 - loop.feedback(s) * np.exp(-loop.delay_s * s))
-        own, true = (np.where(np.abs(P(s) * C) < FAR, P(s) * C, np.nan) for P in (model, plant))
-        radii = np.abs(W_a(s) * C)
-    near = np.flatnonzero(np.abs(own) < NEAR)
-    if not len(near):
-        return Nyquist(own, true, omega[:0], own[:0], radii[:0])
-    parts = [np.abs(np.diff(own[near])), np.diff(np.log(omega[near]))]  # along the curve, and along the frequencies
-    along = np.cumsum([0.0, *sum(part / max(part.sum(), 1e-300) for part in parts)])
-    worst = np.argmax(radii[near] / np.abs(1 + own[near]))
-    at = near[np.unique(np.append(np.searchsorted(along, np.linspace(0.0, along[-1], DISCS)), worst))]
-    return Nyquist(own, true, omega[at], own[at], radii[at])
 
 
 def saturated(run: Run) -> Real:

@@ -59,16 +59,17 @@ def ranges(design: Design, state: State) -> list[Range]:
     """
     signals = design.signals
     found = [_range("limit", None, f"limits of {signals.input}", *_around_zero(*state.limits))]
-    many = len(state.amplitudes) > 1
+    many, unit = len(state.amplitudes) > 1, f" [{signals.output_unit}]" if signals.output_unit else ""
+    largest = FOURFOLD * max(map(abs, state.amplitudes)) or 1.0
     for index, omega in enumerate(state.choices.reference_omegas):
         of = f" {index + 1}" if many else ""
-        largest = FOURFOLD * max(map(abs, state.amplitudes)) or 1.0
-        unit = f" [{signals.output_unit}]" if signals.output_unit else ""
         found.append(_range("amplitude", index, f"reference amplitude{of}{unit}", 0.0, largest))
         if omega:
             title = f"reference frequency{of} [rad/s]"
             found.append(_range("phase", index, f"reference phase{of} [rad]", -math.pi, math.pi))
             found.append(_range("reference-omega", index, title, omega / FOURFOLD, omega * FOURFOLD))
+    if 0.0 not in state.choices.reference_omegas:  # whose amplitude is a constant already
+        found.append(_range("offset", 0, f"reference offset{unit}", -largest, largest))
     for name, title in (("a", "a, pole of the loop [rad/s]"), ("recovery", "recovery of the anti-windup, at most [s]")):
         for value in state.numbers[name]:
             found.append(_range(name, 0, title, value / FOURFOLD, value * FOURFOLD))

@@ -197,7 +197,7 @@ def _line_with_band(panel: Axes, model: IdentifiedModel, omega: Real, values: Re
     if covariance is not None:
         view = panel.get_ylim()  # an open parameter may leave the band without end
         half = unit * covariance.of_response(model.plant, omega)[part]
-        panel.fill_between(hertz(omega), values - half, values + half, **BAND, label="95 % confidence of the model")
+        panel.fill_between(hertz(omega), values - half, values + half, **BAND, label="its 95 % band")
         panel.set_ylim(view)
 
 

@@ -57,6 +57,12 @@ def sampling_rate(rate_hz: float) -> str:
     return f"{number(rate_hz / unit)} {name}"
 
 
+def hertz(frequency: float) -> str:
+    """Return a frequency in Hz, kHz or MHz, the largest that it is not below."""
+    unit, name = next((unit for unit in ((1e6, "MHz"), (1e3, "kHz")) if frequency >= unit[0]), (1.0, "Hz"))
+    return f"{number(frequency / unit)} {name}"
+
+
 def fraction(value: float) -> str:
     """Return a value below 1 as 1/n where n is whole, else as a decimal number."""
     if 0 < value < 1 and math.isclose(1 / value, round(1 / value), rel_tol=1e-6):
@@ -72,6 +78,16 @@ def only(summary: pd.DataFrame, column: str) -> float:
 def of_limits(summary: pd.DataFrame) -> str:
     """Return the limits of the runs in a summary, ``+-12`` or ``-3 to 12``."""
     return limits_text(float(summary["lower_limit"].iloc[0]), float(summary["limit"].iloc[0]))
+
+
+def with_unit(value: float, unit: str, digits: int = 3) -> str:
+    """A value in words with its unit, where it is known."""
+    return f"{number(value, digits)} {unit}".rstrip()
+
+
+def limits_said(table: pd.DataFrame, unit: str) -> str:
+    """The limits of a table in words: ``+-12 A`` or ``-3 to 12 A``."""
+    return f"{of_limits(table)} {unit}".rstrip()
 
 
 def of_run(summary: pd.DataFrame, run: str, column: str) -> float:

@@ -79,7 +79,8 @@ class LoopCurves:
         low, high = self.corners()
         found = frequency_grid(self._roots)
         delay_s = max(self.loop.plant.delay_s, self.loop.delay_s)
-        turns = np.arange(low, high, tau / TURNS / delay_s)[:MOST] if delay_s else np.zeros(0)
+        step = tau / TURNS / delay_s if delay_s else high
+        turns = np.arange(low, min(high, low + MOST * step), step)
         return np.unique(np.concatenate([[low, high], found[(found > low) & (found < high)], turns]))
 
     @property

@@ -15,6 +15,7 @@ from identification.model.fit_record import FitRecord
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
 from identification.model.reports import BoundReport, SubspaceCheck
+from identification.model.signals import UNNAMED, Signals
 from identification.output.fit_facts import bound_text, digits_of
 from identification.sweeps.response import FrequencyResponse
 from paper_figures.look.captions import number
@@ -22,7 +23,7 @@ from paper_figures.look.captions import number
 Paragraph = tuple[str, str]
 """A head and sentences."""
 
-SYMBOLS = {"gain": "gain K", "delay [s]": "delay h [s]"}
+SYMBOLS = {"delay [s]": "delay h [s]"}
 MOST_NAMES = 6  # of files, one by one
 MOST_TOUCHES = 3  # that are named
 CERTAIN = 1e-6  # a probability below this is as good as 0
@@ -59,10 +60,12 @@ def parameter_table(model: IdentifiedModel) -> Table:
     values = [parameter.value for parameter in model.plant.parameters]
     said = [cells(value, *both, *beside) for value, both, *beside in zip(values, ends, *columns, strict=True)]
     sureness = ("95 % interval", "noise", *(["scatter"] if fit.scatter is not None else []))
-    return plant_table(model.plant, said, ("estimate", *sureness))
+    return plant_table(model.plant, said, ("estimate", *sureness), model.signals)
 
 
-def plant_table(plant: PlantModel, cells: Sequence[tuple[str, ...]], head: tuple[str, ...]) -> Table:
+def plant_table(
+    plant: PlantModel, cells: Sequence[tuple[str, ...]], head: tuple[str, ...], signals: Signals = UNNAMED
+) -> Table:
     """A row for each parameter of a plant, for a mode omega at the left and zeta at the right.
 
     Parameters
@@ -73,13 +76,17 @@ def plant_table(plant: PlantModel, cells: Sequence[tuple[str, ...]], head: tuple
         What is said of each of ``plant.parameters``.
     head
         Of these cells; that of zeta begins with its name.
+    signals
+        Whose units the gain has.
     """
+    unit = _gain_unit(signals, plant.integrators)
+    symbols = SYMBOLS | {"gain": f"gain K [{unit}]" if unit else "gain K"}
     rows: list[tuple[str, ...]] = []
     for parameter, said in zip(plant.parameters, cells, strict=True):
         if parameter.quantity == "zeta":
             rows[-1] += said
         else:
-            rows.append((SYMBOLS.get(parameter.label, parameter.label), *said))
+            rows.append((symbols.get(parameter.label, parameter.label), *said))
     width = max(map(len, rows))
     return Table(
         ("parameter", *head, "zeta", *head[1:])[:width], tuple(row + ("",) * (width - len(row)) for row in rows)
@@ -100,7 +107,6 @@ def paragraphs(model: IdentifiedModel, tests: Sequence[FrequencyResponse]) -> tu
         ("Structure", _structure(fit)),
         ("Intervals", _intervals(fit)),
         ("Residuals", _residuals(fit)),
-        *(("Caution", said) for said in _cautions(fit)),
         *(("Subspace", said) for said in _checks(fit.checks)),
         ("Bound", _bound(model.additive_bound, fit.bound)),
     )
@@ -111,6 +117,18 @@ def fitted(model: IdentifiedModel) -> FitRecord:
     if model.fit is None:
         raise InputError("the model holds no fit that this version reads; expected one that it fitted to sweeps")
     return model.fit
+
+
+def _gain_unit(signals: Signals, integrators: int) -> str:
+    """The unit of K in K/s^integrators: output over input, with as many seconds below, or above."""
+    if not signals.gain_unit:
+        return ""
+    above, below = signals.output_unit, signals.input_unit
+    seconds = "" if integrators == 0 else "s" if abs(integrators) == 1 else f"s^{abs(integrators)}"
+    above, below = (above, f"{below} {seconds}") if integrators > 0 else (f"{above} {seconds}", below)
+    above, below = above.strip() or "1", below.strip()
+    above, below = (f"({each})" if set(each) & set(" /*") else each for each in (above, below))
+    return f"{above}/{below}" if below else above
 
 
 def _rounded(value: float, digits: int) -> str:
@@ -209,8 +227,9 @@ def _checks(checks: Mapping[str, SubspaceCheck]) -> Iterator[str]:
             yield f"No answer by N4SID from {_few(names)}: {reason}."
 
 
-def _cautions(fit: FitRecord) -> list[str]:
-    return [_sentence(said) for said in fit.cautions]
+def cautions(model: IdentifiedModel) -> list[str]:
+    """What the data leave open, a sentence each; raises InputError if the model does not say how it was fitted."""
+    return [_sentence(said) for said in fitted(model).cautions]
 
 
 def _sentence(said: str) -> str:
@@ -223,8 +242,8 @@ def _bound(bound: AdditiveBound, report: BoundReport) -> str:
         for touch in report.touches[:MOST_TOUCHES]
     ]
     return (
-        f"{bound_text(bound)}: at no line below the distance of a test from the model, nor between the "
-        "lines, as far as was looked, below that of its own fit, "
+        f"W_a bounds how far the plant may be from the model: {bound_text(bound)}, at no line below the distance of a "
+        "test from the model, nor between the lines, as far as was looked, below that of its own fit, "
         f"{number(report.mean_excess)} times their envelope on average and "
         f"{number(report.largest_excess)} times at most (no bound of this order gets below "
         f"{lower_end(report.least_excess, 3)})."

@@ -30,6 +30,9 @@ HINTED = 1.05  # width of letters fitted to the pixels of a PNG, to that of the 
 SPACE = 0.25  # width of a space, of the letters' size
 GAP = 0.3  # widest between the columns of a table [in]
 SYNTHETIC = "#D55E00"
+SMALL = 7.0  # of the panels' keys [pt]
+SHORT = {"95 % confidence of the model": "95 % confidence"}
+"""What the panels' keys have less room for."""
 
 SYMBOLS = {
     "omega": r"$\omega$",
@@ -82,9 +85,10 @@ def draw(summary: Summary, model: IdentifiedModel, tests: Sequence[FrequencyResp
         The plant with its bound, and the responses that it was fitted to.
     """
     for size in SIZES:
-        above = [_heading(summary, size), _table(summary.parameters, size), _paragraphs(summary.basis, size)]
-        below = [_table(summary.loops, size)] if summary.loops else []
-        below.append(_paragraphs(summary.designs, size))
+        above = [_heading(summary, size), _paragraphs(summary.advice, size), _table(summary.parameters, size)]
+        above.append(_paragraphs(summary.basis, size))
+        below = [_table(summary.runs, size)] if summary.runs else []
+        below.append(_paragraphs((*summary.designs, *summary.refused), size))
         room = HEIGHT - 2 * MARGIN - sum(block.height for block in (*above, *below))
         if room >= LEAST:
             break
@@ -123,20 +127,24 @@ def _panels(
     draw_relative_distance(relative, model, tests)
     for panel in (magnitude, distance):
         panel.tick_params(labelbottom=False, which="both")
+    for panel in figure.axes:
+        panel.yaxis.label.set_fontsize(SMALL)
     for panel in (phase, relative):
         panel.set_xlabel(HERTZ)
-    for panel in figure.axes:
-        for line in panel.legend(ncols=3, **panels.ABOVE).get_lines():
+    for panel in (magnitude, distance, relative):  # the phase has the lines of the magnitude
+        handles, labels = panel.get_legend_handles_labels()
+        said = [SHORT.get(label, label) for label in labels]
+        for line in panel.legend(handles, said, ncols=4, fontsize=SMALL, **panels.ABOVE).get_lines():
             line.set_markersize(4)
     figure.align_ylabels()
     style.panel_letters((magnitude, phase, distance, relative))
 
 
 def _heading(summary: Summary, size: float) -> Block:
-    said = [Piece(0, summary.title, weight="bold")]
+    lines = [(Piece(0, summary.title, weight="bold"),)]
     if summary.synthetic:
-        said.append(Piece(WIDTH - 2 * MARGIN, summary.synthetic, "right", "bold", SYNTHETIC))
-    return Block(size + 1, (tuple(said),))
+        lines.append((Piece(0, summary.synthetic, weight="bold", color=SYNTHETIC),))
+    return Block(size + 1, tuple(lines))
 
 
 def _table(table: Table, size: float) -> Block:

@@ -1,19 +1,23 @@
-"""The one page on a plant in words and numbers: fit, tests, bound, designs, and what was refused and why."""
+"""The one page on a plant in words and numbers: what to do with it, the fit and what it rests on, runs and refusals."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
+from math import isnan
+from typing import Any
 
 import pandas as pd
 
-from design.design_file import Design
 from identification.base.errors import InputError
 from identification.model.model_file import IdentifiedModel
+from identification.model.signals import Signals
 from identification.sweeps.response import FrequencyResponse
-from paper_figures.summary import of_designs, of_fit
-from paper_figures.summary.of_designs import DESIGNS, FIGURES, FOLLOWING
+from paper_figures.look.captions import number
+from paper_figures.summary import of_fit
+from paper_figures.summary.advice import FOLLOWS, advice
+from paper_figures.summary.build_folder import DESIGNS, Found
 from paper_figures.summary.of_fit import Paragraph, Table, fitted
 
 WIDTH = 112  # of the text, in characters
@@ -26,42 +30,41 @@ class Summary:
     Parameters
     ----------
     title
-        The plant's structure.
+        The plant's signals and its structure.
     synthetic
         What to say if there are tests that nobody measured, else nothing.
+    advice
+        What to do and what not to.
     parameters
         Estimates with their intervals and standard errors.
     basis
         What the numbers rest on.
-    loops
-        What the simulated loops did, if any was simulated.
+    runs
+        What the run under the reference did without and with anti-windup, if there is one.
     designs
-        What each design gives, or the sentence with which it, or an experiment that follows it, was refused.
+        What was chosen for the designs.
     refused
-        Those of them that are refusals.
+        The sentences with which designs and tables were refused.
     """
 
     title: str
     synthetic: str
+    advice: tuple[Paragraph, ...]
     parameters: Table
     basis: tuple[Paragraph, ...]
-    loops: Table | None
+    runs: Table | None
     designs: tuple[Paragraph, ...]
     refused: tuple[Paragraph, ...]
 
     def text(self) -> str:
         """The page as plain text."""
-        parts = [self.title, self.synthetic, _aligned(self.parameters), *map(_filled, self.basis)]
-        parts += [_aligned(self.loops) if self.loops else "", *map(_filled, self.designs)]
+        parts = [self.title, self.synthetic, *map(_filled, self.advice), _aligned(self.parameters)]
+        parts += [*map(_filled, self.basis), _aligned(self.runs) if self.runs else ""]
+        parts += map(_filled, (*self.designs, *self.refused))
         return "\n\n".join(part for part in parts if part)
 
 
-def summarise(
-    model: IdentifiedModel,
-    tests: Sequence[FrequencyResponse],
-    designs: Mapping[str, Design | str],
-    outcomes: Mapping[str, pd.DataFrame | str],
-) -> Summary:
+def summarise(model: IdentifiedModel, tests: Sequence[FrequencyResponse], found: Found) -> Summary:
     """Put into words what became of a plant.
 
     Parameters
@@ -70,46 +73,72 @@ def summarise(
         As ``python -m identification fit`` wrote it.
     tests
         What it was fitted to.
-    designs
-        ``delay_free`` and ``extended``: the design, or the sentence that refused it; left out if nobody tried.
-    outcomes
-        The same of the experiments ``delay_free``, ``extended`` and ``f_gamma``: their tables NAME_summary.
+    found
+        What a refit has made for it so far.
 
     Raises
     ------
     InputError
         The model does not say how it was fitted, or was fitted to other tests.
     """
-    fit = fitted(model)
+    fit, signals = fitted(model), model.signals
     names = [test.name for test in fit.tests]
     if names != [test.name for test in tests]:
         raise InputError(f"the model was fitted to {', '.join(names) or 'nothing'}; expected these sweeps")
     synthetic = sum(test.synthetic for test in tests)
-    made = {name: design for name, design in designs.items() if isinstance(design, Design)}
-    tables = {name: table for name, table in outcomes.items() if isinstance(table, pd.DataFrame)}
-    given = [(DESIGNS[name], of_designs.sentences(made[name], name, tables)) for name in made]
-    refused = tuple(_refused(designs, outcomes))
+    tracking = found.made.get("tracking")
     return Summary(
-        title=f"Plant with {fit.structure}",
+        title=f"{signals.output_name.capitalize()} over {signals.input_name}: plant with {fit.structure}",
         synthetic=f"SYNTHETIC DATA: {synthetic} of {len(tests)} tests were never measured" if synthetic else "",
+        advice=advice(model, found),
         parameters=of_fit.parameter_table(model),
         basis=of_fit.paragraphs(model, tests),
-        loops=of_designs.loop_table(made, tables),
-        designs=tuple(sorted((*given, *refused))),
-        refused=refused,
+        runs=None if tracking is None else _runs(tracking, signals),
+        designs=tuple(_designs(found)),
+        refused=tuple(_refused(found)),
     )
 
 
-def _refused(designs: Mapping[str, Design | str], outcomes: Mapping[str, pd.DataFrame | str]) -> Iterator[Paragraph]:
-    """What was refused, the sentence with which it was, and the figures that are not drawn for it."""
-    text = "Refused: {}. Not drawn: Fig. {}."
-    for name, said in designs.items():
-        if isinstance(said, str):
-            yield DESIGNS[name], text.format(said, ", ".join(FIGURES[experiment] for experiment in FOLLOWING[name]))
-        for experiment in FOLLOWING[name]:
-            outcome = outcomes.get(experiment)
-            if isinstance(outcome, str):
-                yield DESIGNS[name], text.format(outcome, FIGURES[experiment])
+def _runs(tracking: pd.DataFrame, signals: Signals) -> Table:
+    """A row for each run under the reference: when it was last at a limit, what it asked for, what error is left."""
+    units = (signals.input_unit, signals.output_unit)
+    asked, left = (f" [{unit}]" if unit else "" for unit in units)
+    head = (
+        "run",
+        "last at a limit [s]",
+        f"most asked for{asked}",
+        f"error, last period{left}",
+        "of the amplitude [%]",
+    )
+    return Table(head, tuple(_run(row) for row in tracking.to_dict("records")))
+
+
+def _run(row: dict[Hashable, Any]) -> tuple[str, ...]:
+    name = "without anti-windup" if row["run"] == "none" else f"anti-windup {row['run']}"
+    last, offset, ripple, percent, largest = (
+        float(row[column])
+        for column in ("last_saturation_s", "offset", "ripple", "relative_error_percent", "asked_control")
+    )
+    if isnan(offset):
+        return name, "diverges", "", "", ""
+    said = "to the end" if isnan(last) else "never" if last == 0 else number(last)
+    return name, said, number(largest), number(abs(offset) + ripple), "" if isnan(percent) else number(percent)
+
+
+def _designs(found: Found) -> Iterator[Paragraph]:
+    design = found.design("design")
+    if design is not None:
+        anti_windup = f"corrected anti-windup: recovery in {number(design.corrected.judgement.recovery_s)} s"
+        yield "Design", f"{'; '.join((*design.free.reasons, anti_windup))}."
+
+
+def _refused(found: Found) -> Iterator[Paragraph]:
+    """What was refused, and the sentence with which it was; what hangs on it is not there either."""
+    said = {"the axis": found.axis} if isinstance(found.axis, str) else {}
+    said |= {DESIGNS[name]: each for name, each in found.designs.items() if isinstance(each, str)}
+    said |= {FOLLOWS[name]: each for name, each in found.tables.items() if isinstance(each, str)}
+    for what, sentence in said.items():
+        yield "Refused", f"{what[0].upper()}{what[1:]}: {sentence}."
 
 
 def _aligned(table: Table) -> str:

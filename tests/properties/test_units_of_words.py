@@ -21,7 +21,7 @@ from experiments.thesis.studies.interpolation import interpolation_tables
 from experiments.thesis.studies.sampled_rates import sampled_rates_tables
 from identification.base.digits import told_apart
 from paper_figures.look.captions import apart, duration, number, sampling_rate
-from paper_figures.summary.of_designs import loop_table, sentences
+from paper_figures.thesis.report.of_designs import loop_table, sentences
 
 RANGE = re.compile(r"(?:from|between) (\S+)(?: \w+)? (?:to|and) (\S+)")
 FIGURES = ("2_12", "2_13", "2_14", "4_01", "4_02", "4_03", "4_04", "a_02", "a_05", "a_09")

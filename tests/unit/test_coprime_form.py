@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -36,6 +37,7 @@ PLANTS = {
 }
 
 
+@cache
 def design_of(plant: PlantModel) -> Design:
     return design_extended(IdentifiedModel(plant, BOUND), [1.5], sector=0.8)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import socket
+import sys
 from dataclasses import replace
 from pathlib import Path
 from urllib.parse import parse_qs
@@ -32,7 +33,7 @@ from paper_figures.explore.words import run_text, table, true_plant_text, withou
 
 @pytest.fixture(scope="module")
 def start(extended_design: Design) -> State:
-    return start_of(extended_design, (-12.0, 11.0), (50.0,), (0.3,))
+    return start_of(extended_design, (-12.0, 11.0), experiments.sinusoid(50.0, 1.5, 0.3, 7.0))
 
 
 @pytest.fixture(scope="module")
@@ -77,8 +78,6 @@ def test_a_page_begins_with_what_the_reference_needs(delay_free_design: Design) 
     needed = 1 / abs(complex(delay_free_design.plant(1j * delay_free_design.reference_omegas[0])))
     assert state.limits == pytest.approx((-1.2 * needed, 1.2 * needed), rel=1e-9)
     assert state.numbers["a"] == ()
-    with pytest.raises(InputError, match="2 amplitudes and 1 phases"):
-        start_of(delay_free_design, amplitudes=(1.0, 2.0))
 
 
 def test_every_slider_reaches_its_state_and_beyond_what_the_loop_tolerates(
@@ -106,16 +105,15 @@ def test_the_run_is_that_of_simulate_with_the_true_plant(extended_design: Design
         return tuple(Mode(0.9 * mode.omega, mode.zeta) for mode in modes)
 
     true = PlantModel(1.3 * own.gain, slower(own.zero_modes), slower(own.pole_modes), 0.02)
-    reference = experiments.sinusoid(50.0, 1.5, 0.3, 0.0)
+    reference = experiments.sinusoid(50.0, 1.5, 0.3, 7.0)
     run = explorer.run(state)
     expected = experiments.simulate(
         extended_design, (-12.0, 11.0), reference, until_s=10 * math.pi / 1.5, samples=len(run.time_s), plant=true
     )
     np.testing.assert_allclose(run.control, expected.control, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(run.outputs["output"], expected.outputs["output"], rtol=1e-9, atol=1e-9)
-    assert "gain times 1.3, the frequencies of its modes times 0.9, a dead time of 0.02 s instead of 0.0081 s" in (
-        true_plant_text(state.true, explorer.start.true)
-    )
+    said = "gain times 1.3 and the frequencies of its modes times 0.9 and a dead time of 0.02 s instead of 0.0081 s"
+    assert said in true_plant_text(state.true, explorer.start.true)
 
 
 def test_the_shaded_times_are_those_in_which_the_control_is_beyond_a_limit(explorer: Explorer) -> None:
@@ -257,7 +255,7 @@ def test_of_the_values_that_come_while_it_works_only_the_newest_is_worked_on() -
         (["--port", "{port}"], "which cannot be had (Address already in use); expected a free one"),
         (["--limit", "3", "-3"], "--limit is 3 -3; expected the lower limit first"),
         (["--limit", "inf"], "limit is -inf; expected a finite number"),
-        (["--amplitude", "1", "--amplitude", "2"], "2 amplitudes and 1 phases"),
+        (["--phase", "1"], "no --amplitude is given; expected one for each frequency of the design, 1.5 rad/s"),
     ],
 )
 def test_a_command_that_cannot_serve_says_why(
@@ -272,3 +270,29 @@ def test_a_command_that_cannot_serve_says_why(
         )
     assert result.exit_code == 2
     assert said in result.output
+
+
+def test_without_its_extra_the_command_says_what_to_install(
+    extended_design: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "design.json").write_text(extended_design.to_json(), encoding="utf-8")
+
+    class Missing:
+        """A finder to which Bokeh is not installed."""
+
+        @staticmethod
+        def find_spec(name: str, _path: object = None, _target: object = None) -> None:
+            if name == "bokeh":
+                raise ModuleNotFoundError("No module named 'bokeh'", name=name)
+
+    ours = [f"paper_figures.explore.{name}" for name in ("server", "page", "pictures")]
+    for name in [*ours, *(name for name in sys.modules if name.partition(".")[0] == "bokeh")]:
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.setattr(sys, "meta_path", [Missing, *sys.meta_path])
+    with socket.create_server(("127.0.0.1", 0)) as taken:  # so that it ends in any case
+        port = str(taken.getsockname()[1])
+        refused = CliRunner().invoke(main, ["explore", str(tmp_path / "design.json"), "--no-browser", "--port", port])
+    assert refused.exit_code == 2
+    assert refused.stderr == (
+        'Error: bokeh is not installed, which this command needs; give pip install "antiwindup-thesis[explore]"\n'
+    )

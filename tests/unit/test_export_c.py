@@ -39,11 +39,12 @@ PLANTS = {
 }
 CASES = [
     ("one integrator, a share of a sample", 2000.0, "tustin", "corrected", (-3.0, 2.0)),
-    ("one integrator, a share of a sample", 1700.0, "exact", "none", (-2.0, 2.0)),
+    ("one integrator, a share of a sample", 1700.0, "matched", "corrected", (-2.0, 2.0)),
     ("none, no dead time, a zero to the right", 1500.0, "tustin", "corrected", (-math.inf, 1.0)),
     ("none, no dead time, a zero to the right", 1500.0, "exact", "internal-model", (0.0, 1.0)),
     ("two integrators, whole samples", 1000.0, "tustin", "corrected", (-0.5, 0.7)),
-    ("two integrators, whole samples", 1000.0, "exact", "corrected", (-0.5, 0.7)),
+    ("two integrators, whole samples", 1000.0, "matched", "corrected", (-0.5, 0.7)),
+    ("none, whole samples", 300.0, "matched", "none", (-2.0, 1.5)),
     ("chapter 2", 2000.0, "tustin", "corrected", (-12.0, 9.0)),
 ]
 

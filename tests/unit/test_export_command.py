@@ -11,6 +11,7 @@ from compiled_controller import self_test
 
 from antiwindup.__main__ import main
 from design.design_file import Design
+from experiments.drive import choose_method
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +39,9 @@ def test_what_is_written_and_said(design_file: Path, tmp_path: Path) -> None:
 
 def test_json_says_what_the_design_does(design_file: Path, tmp_path: Path) -> None:
     status, said = export(design_file, tmp_path, "--to", "json", "--anti-windup", "none")
-    assert (status, said.split("; ")[0]) == (0, "No guarantee: there is no anti-windup")
+    assert status == 0
+    assert said.startswith("At 500 Hz with the method matched, which is chosen, the linear loop is stable")
+    assert "No guarantee: there is no anti-windup; controller.json, controller_test.csv -> " in said
     content = json.loads((tmp_path / "controller.json").read_text(encoding="utf-8"))
     assert (content["rate_hz"], content["limits"]) == (500.0, {"low": -12.0, "high": 10.0})
     assert content["windup"]["A"] == []
@@ -62,6 +65,13 @@ def test_what_is_refused(design_file: Path, tmp_path: Path, options: list[str], 
     assert status == 2
     assert sentence in said
     assert not list(tmp_path.iterdir())
+
+
+def test_an_unstable_loop_is_refused(design_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(choose_method, "least_rate", lambda *_: "a search")  # of seconds, with tests of its own
+    status, said = export(design_file, tmp_path, "--to", "c", "--method", "exact", "--rate", "3")
+    assert (status, list(tmp_path.iterdir())) == (2, [])
+    assert "At 3 Hz with the method exact the linear loop is UNSTABLE; matched: stable" in said
 
 
 def test_the_design_is_not_written_over(design_file: Path) -> None:

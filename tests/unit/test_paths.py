@@ -34,7 +34,7 @@ from paper_figures.__main__ import main as paper_figures
 from paper_figures.look import style
 from paper_figures.summary.of_fit import _tests as said_of
 
-OUTPUTS = ("output", "build", "page", "responses")
+OUTPUTS = ("output", "build", "page", "responses", "figure")
 ODD = ("loop", "loop/a", "x" * 300, "model.json/a", "missing/a", "pipe", "locked/a", os.fsdecode(b"\xff/a"))
 
 values = st.recursive(
@@ -99,7 +99,8 @@ def test_what_cannot_be_looked_at_is_one_sentence(odd: Path, name: str) -> None:
 
 
 def test_every_path_of_a_command_is_of_a_type_that_looks_at_it() -> None:
-    types = (path_types.INPUT, path_types.INPUT_FILE), (path_types.OUTPUT_FILE, path_types.OUTPUT_FOLDER)
+    outputs = path_types.OUTPUT_FILE, path_types.OUTPUT_FOLDER, path_types.FIGURE_FILE
+    types = (path_types.INPUT, path_types.INPUT_FILE), outputs
     met = set()
     for words, command in commands():
         for each in command.params:

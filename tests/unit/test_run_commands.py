@@ -138,6 +138,7 @@ def test_sampled_writes_the_run(extended_design: Design, design_json: Path) -> N
 def test_sampled_without_limits(design_json: Path) -> None:
     result = invoke("sampled", design_json, "--limit", "inf", "--anti-windup", "none")
     assert "; 0 samples beyond the limits\n" in result.stdout
+    assert result.stdout.startswith("At 800 Hz with the method tustin the linear loop is stable, its steady error")
     table = written(result, design_json)
     np.testing.assert_array_equal(table["control"], table["saturated_control"])
 

@@ -52,12 +52,12 @@ def as_thesis(summary: pd.DataFrame, table: pd.DataFrame, limit_is_given: bool) 
     Returns
     -------
     DataFrame
-        The columns of the summary up to ``covered`` without lower_limit; and limit_is_given (0 or 1) and
+        The columns of the summary up to ``covered`` without lower_limit and asked_control; limit_is_given (0 or 1); and
         peak_error_after_1s (from one second on, as chapter 4 reads its plot; empty: the run is shorter).
     """
     after = table[table["time_s"] >= 1.0]
     peaks = [float(np.abs(after[f"error_{run}"].to_numpy()).max()) if len(after) else np.nan for run in summary["run"]]
-    found = summary.loc[:, :"covered"].drop(columns="lower_limit")
+    found = summary.loc[:, :"covered"].drop(columns=["lower_limit", "asked_control"])
     found.insert(2, "limit_is_given", int(limit_is_given))
     found.insert(list(found).index("ripple") + 1, "peak_error_after_1s", peaks)
     return found

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from paper_figures.axis_figures.limits import FLOOR, curves
 from paper_figures.look import panels
 from paper_figures.look.captions import at_least, at_most, number, only
 from paper_figures.look.panels import CORRECTED, NONE, THESIS
@@ -23,10 +22,6 @@ TABLES: tuple[str, ...] = (
 )
 
 RUNS = (NONE, THESIS, CORRECTED)
-FLOOR = LINES["family 4"]
-GREY = panels.paler(FLOOR["color"], 0.6)
-DECADES = 3
-DIVERGENT = 100.0  # a run that exceeds all that is out of reach by more than this leaves the panel
 
 
 def caption(tables: Mapping[str, pd.DataFrame]) -> str:
@@ -71,14 +66,15 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the figure; (b) ends a little above the limit that perfect tracking needs."""
     axes = panels.lettered(FULL_WIDTH, 2.8, "ab")
     rest, periodic = tables["limits_extended_summary"], tables["limits_delay_free"]
-    _curves(axes["a"], rest, "start_s", "rest", "tail", {})
+    curves(axes["a"], rest, "start_s", "rest", {f"tail_{run.name}": run.kind for run in RUNS})
     axes["a"].plot([], [], **FLOOR, label="best possible")
     for run in RUNS:
         axes["a"].plot([], [], **LINES[run.kind], label=run.label)
     axes["a"].set(xlabel="Time $t_0$ [s]", ylabel=r"$\max_{t \geq t_0}\,|e(t)|$")
     axes["a"].legend(**panels.ABOVE, ncols=2)
 
-    _curves(axes["b"], periodic, "limit", "periodic", "peak", {"marker": "o", "markersize": 2.5})
+    peaks = {f"peak_{run.name}": run.kind for run in RUNS}
+    curves(axes["b"], periodic, "limit", "periodic", peaks, {"marker": "o", "markersize": 2.5})
     required = only(periodic, "required")
     axes["b"].axvline(required, **LINES["reference"], label="needed for tracking")
     if len(periodic) > 1:
@@ -88,21 +84,3 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     figure = axes["a"].get_figure(root=True)
     assert figure is not None
     return figure
-
-
-def _curves(
-    panel: Axes, table: pd.DataFrame, along: str, floor: str, error: str, marker: dict[str, str | float]
-) -> None:
-    """Draw the floor and the errors of the runs, in as many decades as can be read."""
-    x, errors = table[along], {run: table[f"{error}_{run.name}"] for run in RUNS}
-    greatest = float(np.nanmax([values.max() for values in errors.values()]))
-    top = 2 * min(greatest, DIVERGENT * float(table[f"{floor}_upper"].max()) or greatest)
-    bottom = top / 10**DECADES
-    lower, upper = (table[f"{floor}_{end}"].clip(lower=bottom / 10**DECADES) for end in ("lower", "upper"))
-    panel.fill_between(x, bottom / 10**DECADES, lower, color=GREY, linewidth=0)
-    panel.plot(x, upper, **FLOOR)
-    for run, values in errors.items():
-        panel.plot(x, values, **(LINES[run.kind] | marker))
-    panel.set(yscale="log", ylim=(bottom, top))
-    if len(x) > 1:
-        panel.set_xlim(x.min(), x.max())

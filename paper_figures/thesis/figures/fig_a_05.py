@@ -7,10 +7,9 @@ from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
 
+from paper_figures.axis_figures.rates import CONTINUOUS, METHODS, over_rate
 from paper_figures.look import panels
 from paper_figures.look.captions import duration, number, only, sampling_rate, settled
 from paper_figures.look.panels import CORRECTED, NONE, THESIS
@@ -19,9 +18,6 @@ from paper_figures.look.style import FULL_WIDTH, LINES, styled
 TABLES: tuple[str, ...] = ("sampled", "sampled_summary")
 
 RUNS = (CORRECTED, THESIS, NONE)
-CONTINUOUS = "continuous"
-METHODS = {"tustin": ("Tustin's rule", "o"), "exact": ("held inputs", "s")}
-MARKER = 3.5
 BROAD = "#CCCCCC"
 DECADES = 8
 DIVERGENT = 100.0  # a run whose error exceeds another's by more than this leaves the panels
@@ -36,7 +32,7 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     levels = round(2 * only(summary, "limit") / quantum)
     tustin, held = (
         " and ".join(_size(_of(summary, "corrected", method, rate, "steady_error")) for rate in rates[[0, -1]])
-        for method in METHODS
+        for method in ("tustin", "exact")
     )
     shown, slowest, fastest = (sampling_rate(hertz) for hertz in (only(summary, "shown_hz"), *rates[[0, -1]]))
     lasting = _size(_of(summary, "thesis", CONTINUOUS, math.nan, "steady_error"))
@@ -100,7 +96,10 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     axes["a"].set(xlabel="Time $t_0$ [s]", ylabel=r"$\max_{t \geq t_0}\,|e(t)|$")
     axes["a"].set_xlim(0, time_s[-1] - only(summary, "period_s"))
     axes["a"].legend(**panels.ABOVE, ncols=2)
-    _over_rate(axes["b"], summary)
+    over_rate(axes["b"], summary, [run.name for run in RUNS])
+    axes["b"].axvline(only(summary, "shown_hz"), **LINES["family 6"])
+    axes["b"].set_ylabel(r"$\max\,|e(t)|$, last period")
+    axes["b"].legend(**panels.ABOVE, ncols=2)
     peaks = np.array([tail[0] for tail in tails.values() if np.isfinite(tail[0])])
     top = 2 * min(peaks.max(), DIVERGENT * peaks.min()) if len(peaks) else 1.0
     least = float(summary["steady_error"][summary["rate_hz"].notna()].min())
@@ -115,24 +114,3 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
 def _tail(error: np.ndarray) -> np.ndarray:
     """The greatest |error| from each sample on; NaN for a run that diverges."""
     return np.asarray(np.maximum.accumulate(np.abs(error[::-1]))[::-1])
-
-
-def _over_rate(panel: Axes, summary: pd.DataFrame) -> None:
-    """The error of the last period: a line a run and a marker a method; broad, in continuous time."""
-    ends = (summary["rate_hz"].min(), summary["rate_hz"].max())
-    for order, run in enumerate(RUNS):
-        line = LINES[run.kind]
-        panel.plot(ends, [_of(summary, run.name, CONTINUOUS, math.nan, "steady_error")] * 2, **panels.band(line))
-        for method, (_, marker) in METHODS.items():
-            rows = summary[(summary["run"] == run.name) & (summary["method"] == method)]
-            face = line["color"] if method == "tustin" else "#FFFFFF"
-            look = line | {"marker": marker, "markersize": MARKER, "markerfacecolor": face, "zorder": 3 + order}
-            panel.plot(rows["rate_hz"], rows["steady_error"], **look)
-    for method, (label, marker) in METHODS.items():
-        face = "#000000" if method == "tustin" else "#FFFFFF"
-        look = {"color": "#000000", "linestyle": "none", "marker": marker, "markersize": MARKER}
-        panel.plot([], [], **look, markerfacecolor=face, label=label)
-    panel.axvline(only(summary, "shown_hz"), **LINES["family 6"])
-    panel.set(xscale="log", xlabel="Sampling rate [Hz]", ylabel=r"$\max\,|e(t)|$, last period")
-    panel.xaxis.set_minor_formatter(NullFormatter())
-    panel.legend(**panels.ABOVE, ncols=2)

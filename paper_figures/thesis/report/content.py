@@ -18,10 +18,10 @@ from identification.base.errors import InputError, printable
 from identification.model.plant import PlantModel
 from identification.output.fit_facts import bound_text
 from paper_figures.look.captions import number
-from paper_figures.summary.of_designs import DESIGNS, FOLLOWING, loop_table, sentences
-from paper_figures.summary.of_fit import Paragraph, Table, paragraphs, parameter_table, plant_table
+from paper_figures.summary.of_fit import Paragraph, Table, cautions, paragraphs, parameter_table, plant_table
 from paper_figures.thesis.report.inputs import Inputs, Picture, experiment_of
 from paper_figures.thesis.report.ledger import Difference, Row, Verdict, differences, row, verdicts
+from paper_figures.thesis.report.of_designs import DESIGNS, FOLLOWING, loop_table, sentences
 
 PACKAGES = (
     *("antiwindup-thesis", "numpy", "scipy", "control", "slycot", "numba", "pandas", "matplotlib", "sippy-unipi"),
@@ -97,7 +97,7 @@ def report_content(inputs: Inputs) -> Content:
         figures=tuple(_figure(inputs, name, fitted and synthetic > 0) for name in inputs.figures),
         tables=inputs.tables,
         parameters=parameter_table(inputs.model) if fitted else _values(inputs.model.plant),
-        basis=paragraphs(inputs.model, inputs.tests) if fitted else _not_fitted(inputs),
+        basis=_basis(inputs) if fitted else _not_fitted(inputs),
         loops=loop_table(made, outcomes),
         designs=tuple(_design(inputs, name, outcomes) for name in inputs.designs),
         versions=(("Python", platform.python_version()), *((name, _version(name)) for name in PACKAGES)),
@@ -152,6 +152,11 @@ def _figure(inputs: Inputs, name: str, synthetic: bool) -> Figure:
 def _values(plant: PlantModel) -> Table:
     """The parameters of a plant that was not fitted here."""
     return plant_table(plant, [(number(parameter.value, 6),) for parameter in plant.parameters], ("value",))
+
+
+def _basis(inputs: Inputs) -> tuple[Paragraph, ...]:
+    said = [("Caution", each) for each in cautions(inputs.model)]
+    return (*paragraphs(inputs.model, inputs.tests), *said)
 
 
 def _not_fitted(inputs: Inputs) -> tuple[Paragraph, ...]:

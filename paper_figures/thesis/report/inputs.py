@@ -22,7 +22,7 @@ from identification.model.plant import PlantModel
 from identification.sweeps.as_fitted import as_fitted
 from identification.sweeps.read_sweeps import KEPT, input_files, read_sweeps
 from identification.sweeps.response import FrequencyResponse
-from paper_figures.summary.of_designs import FOLLOWING
+from paper_figures.thesis.report.of_designs import FOLLOWING
 
 Kind = TypeVar("Kind")
 

@@ -1,0 +1,61 @@
+"""Options that several commands of this room take."""
+
+from __future__ import annotations
+
+from math import tau
+
+import click
+
+from design.choices import GUARANTEES, SECTOR
+from identification.base.command_line import together
+from identification.base.errors import InputError
+from identification.base.path_types import INPUT_FILE, OUTPUT_FILE
+
+OUTPUT = click.option("--output", type=OUTPUT_FILE, required=True, help="design.json to write.")
+DESIGN = click.argument("design", type=INPUT_FILE)
+frequency_options = together(
+    click.option(
+        "--reference-hz",
+        "hertz",
+        type=float,
+        multiple=True,
+        help="Frequency of the reference in Hz; once for each sinusoid; 0 is a constant.",
+    ),
+    click.option("--reference-omega", "omegas", type=float, multiple=True, help="The same in rad/s."),
+)
+"""Frequencies of the reference, the same for both designs."""
+corrected_options = together(
+    click.option(
+        "--recovery",
+        type=float,
+        help="Corrected anti-windup: most time in s for the slowest mode of theta1~ to fall to 1 %; y_d keeps "
+        "the plant's own modes. That of the loop itself unless given.",
+    ),
+    click.option(
+        "--guarantee",
+        type=click.Choice(GUARANTEES),
+        help="Corrected anti-windup: global, whatever the control; robust, so for every plant within W_a; sector, up "
+        "to a control. Global unless given, or sector where the plant allows no other.",
+    ),
+    click.option(
+        "--sector",
+        type=float,
+        help="Of --guarantee sector: k of the circle criterion, below 1; |u| may reach (limit - k V)/(1 - k), V the "
+        f"control that the reference takes; {SECTOR:g} unless given.",
+    ),
+    click.option(
+        "--bandwidth",
+        type=float,
+        help="Corrected anti-windup: no pole of theta1~ beyond it, rad/s; fastest root of P and W_a unless given.",
+    ),
+)
+"""Of the corrected anti-windup, the same for both designs."""
+
+
+def asked_frequencies(hertz: tuple[float, ...], omegas: tuple[float, ...]) -> tuple[float, ...]:
+    """All frequencies of the reference in rad/s; raises InputError when there is none."""
+    if not hertz and not omegas:
+        raise InputError(
+            "no frequency of the reference is given; expected --reference-hz or --reference-omega, 0 for a constant"
+        )
+    return *(tau * frequency for frequency in hertz), *omegas

@@ -1,0 +1,124 @@
+"""Every anti-windup that there is for a design beside the others: recovery, control and guarantee."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
+
+from design.design_file import Design
+from experiments.runs.compare_anti_windups import SETTLED
+from paper_figures.axis_figures.labels import KINDS, look_of
+from paper_figures.look import panels
+from paper_figures.look.captions import at_least, duration, limits_said, only, with_unit
+from paper_figures.look.style import FULL_WIDTH, LINES, styled
+
+TABLES: tuple[str, ...] = ("compare", "compare_runs")
+
+UPSETS = {"start": ("a", "c"), "pulse": ("b", "d")}
+SHOWN = 0.5  # of the time that an upset counts
+FLOOR = 1e-3  # of the amplitude
+FEW = 10  # times the least control is the greatest, below which powers of ten are too few ticks
+DOT: dict[str, Any] = {"marker": "o", "markersize": 5.0, "linestyle": "none"}
+FILLED = {"global": "full", "none": "none"}  # of a marker; half for a sector
+
+
+def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
+    """Return the caption with the numbers of the tables."""
+    table, signals = tables["compare"], design.signals
+    start, pulse = (table[table["upset"] == upset].set_index("run") for upset in UPSETS)
+    said = "; ".join(_said(run, start.loc[run], pulse.loc[run]) for run in start.index if run in KINDS)
+    least, from_s = (float(start[column].max()) for column in ("least_peak_error", "from_s"))
+    half = (only(table, "limit") - only(table, "lower_limit")) / 2
+    physical = ""
+    if not math.isnan(least):
+        error = with_unit(float(at_least(least)), signals.output_unit)
+        forced = f"every controller leaves an error of {error} or more" if least > 0 else "no error is forced"
+        physical = f" From {duration(from_s)} after the start on {forced} by the limits."
+    return (
+        "The anti-windups that there are for this design, each in the same loop under the limits "
+        f"{limits_said(table, signals.input_unit)}. (a) From rest, and (b) after a disturbance of "
+        f"{with_unit(half, signals.input_unit)} at the plant's input, for a tenth of a period: how far the output is "
+        "from that of the loop without limits, over the reference's amplitude; dotted, 1 %, which counts as recovered. "
+        "(c), (d) The recovery time and the greatest control asked for, over the larger limit. A full marker: recovery "
+        "is guaranteed whatever the control; a half one: as long as the control stays within a bound; an open one: "
+        f"nothing is guaranteed. Recovery from rest and after the disturbance: {said}.{physical}"
+    )
+
+
+def _said(run: str, start: pd.Series, pulse: pd.Series) -> str:
+    if isinstance(start["refused"], str):
+        return f"{KINDS[run]}, none for this design ({start['refused']})"
+    times = ["never" if math.isnan(row["recovery_s"]) else duration(row["recovery_s"]) for row in (start, pulse)]
+    return f"{KINDS[run]} {times[0]} and {times[1]}"
+
+
+@styled()
+def draw(design: Design, tables: Mapping[str, pd.DataFrame]) -> Figure:
+    """Return the figure; what never recovers is not in (c) and (d)."""
+    return comparison(tables, KINDS)
+
+
+def comparison(tables: Mapping[str, pd.DataFrame], words: Mapping[str, str]) -> Figure:
+    """Draw distances over time and measures of each run; ``words`` are what the runs are called in the key."""
+    table, runs = tables["compare"], tables["compare_runs"]
+    axes = panels.lettered(FULL_WIDTH, 5.2, "ab;cd")
+    half = float(runs["time_s"].iloc[-1]) / 2
+    amplitude = only(table, "amplitude")
+    for begin, (upset, (above, below)) in zip((0.0, half), UPSETS.items(), strict=True):
+        chosen = (runs["time_s"] >= begin) & (runs["time_s"] <= begin + SHOWN * half)
+        _distances(axes[above], runs[chosen], begin, amplitude, words)
+        _measures(axes[below], table[table["upset"] == upset], words)
+    for letter in "bd":
+        axes[letter].set_ylabel("")
+    handles = axes["a"].get_legend_handles_labels()
+    middle = (len(handles[0]) + 1) // 2
+    for letter, part in (("a", slice(middle)), ("b", slice(middle, None))):
+        axes[letter].legend(*(each[part] for each in handles), **panels.ABOVE, ncols=2)
+    figure = axes["a"].get_figure(root=True)
+    assert figure is not None
+    return figure
+
+
+def _distances(panel: Axes, runs: pd.DataFrame, begin: float, amplitude: float, words: Mapping[str, str]) -> None:
+    time_s = runs["time_s"].to_numpy(float) - begin
+    is_seen = False
+    for run, said in words.items():
+        if f"output_{run}" in runs:
+            distance = (runs[f"output_{run}"] - runs["output_unsaturated"]).abs().to_numpy(float) / amplitude
+            line = LINES[look_of(run)]
+            points = panels.envelope(time_s, np.maximum(distance, FLOOR / 10))
+            panel.plot(*points, **line, label=said, zorder=3 - line["linewidth"] / 10)
+            is_seen |= bool((distance > FLOOR).any())
+    if not is_seen:
+        _say(panel, "no run is away by as much as 0.1 %")
+    panel.axhline(SETTLED, **LINES["saturation limits"])
+    panel.set(yscale="log", ylim=(FLOOR, 10.0), xlim=(0.0, time_s[-1]))
+    panel.set(xlabel="Time after the upset [s]", ylabel=r"$|y - y_\mathrm{unsaturated}|$ / amplitude")
+
+
+def _measures(panel: Axes, table: pd.DataFrame, words: Mapping[str, str]) -> None:
+    for run in words:
+        for _, row in table[(table["run"] == run) & table["recovery_s"].notna()].iterrows():
+            look = DOT | {"fillstyle": FILLED.get(row["guarantee"], "bottom"), "color": LINES[look_of(run)]["color"]}
+            panel.plot(row["largest_control"], row["recovery_s"], **look)
+    if not table["recovery_s"].max() > 0:
+        _say(panel, "every run recovers at once" if (table["recovery_s"] == 0).any() else "no run recovers")
+    panel.set(xscale="log")
+    panel.xaxis.set_minor_formatter(NullFormatter())
+    low, high = panel.get_xlim()
+    if high < FEW * low:
+        panel.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    panel.set(xlabel=r"Greatest $|u|$ / limit", ylabel="Recovery time [s]", ylim=(0, None))
+
+
+def _say(panel: Axes, words: str) -> None:
+    """What there is instead of lines."""
+    panel.text(0.5, 0.5, words, transform=panel.transAxes, ha="center", va="center")

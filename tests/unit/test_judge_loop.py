@@ -1,0 +1,154 @@
+"""The judgement of a sampled loop without a run: its closed-loop poles and its steady error, by other means."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.signal import zpk2ss
+from test_coprime_form import PLANTS, design_of
+
+from design.blocks.block import plant_block
+from design.design_file import Design
+from experiments.drive.choose_method import choose_method, judge_methods, least_rate
+from experiments.drive.difference_equations import SampledBlock
+from experiments.drive.judge_loop import judge_loop
+from experiments.drive.sampled_loop import METHODS, Drive, controller_blocks, simulate_sampled
+from experiments.runs.references import sinusoid
+from identification.model.modes import Mode
+from identification.model.plant import PlantModel
+
+FREE = (-math.inf, math.inf)
+
+
+def steps_of(block: SampledBlock) -> tuple[int, object]:
+    """How many numbers a block keeps from sample to sample, and what it makes of them and of its input."""
+    n, m = len(block.b), len(block.d)
+    length = int((block.first + block.length).max())
+
+    def step(kept: np.ndarray, given: float | None) -> tuple[float, np.ndarray]:
+        """The sum of the outputs without what comes of the input at once; and the numbers kept for the next sample."""
+        x, past = kept[:n], kept[n:].reshape(m, length)
+        p = block.C @ x + block.d * (given or 0.0)
+        held = np.column_stack([p, past])
+        out = sum(block.taps[o, j] * held[o, block.first[o] + j] for o in range(m) for j in range(block.length[o]))
+        return float(out), np.append(block.A @ x + block.b * (given or 0.0), held[:, :length].ravel())
+
+    return n + m * length, step
+
+
+def spectral_radius(design: Design, drive: Drive, plant: PlantModel) -> float:
+    """Of the matrix that carries all numbers of the loop from sample to sample, built by running it from each."""
+    forward, feedback, _, around = controller_blocks(design, None, drive, "coprime")
+    T, late = 1 / drive.rate_hz, (plant.delay_s + drive.input_delay_s) * drive.rate_hz
+    P = plant_block(plant)
+    A, b, c, d = zpk2ss(P.zeros, P.poles, P.gain)
+    n, whole = len(A), math.floor(late + 1e-9)
+    rest = max(late - whole, 0.0)
+    full, part = (expm(np.block([[A, b], [np.zeros((1, n + 1))]]) * t) for t in (T, (1 - rest) * T))
+    sizes = [steps_of(forward), steps_of(feedback)]
+    N_K, N_F = sizes[0][0], sizes[1][0]
+    total = N_K + N_F + n + whole + 1
+
+    def advanced(state: np.ndarray) -> np.ndarray:
+        kept_K, kept_F, x, commands = np.split(state, np.cumsum([N_K, N_F, n]))
+        # the plant's state at the sample is that after the command issued whole + 1 samples ago stood for 1 - rest
+        y = commands[-1] * float(d[0, 0]) + float((c @ (part[:n, :n] @ x + part[:n, n] * commands[-1]))[0])
+        v = (sizes[0][1](kept_K, -y)[0] + sizes[1][1](kept_F, None)[0]) / (1 - around)
+        _, new_K = sizes[0][1](kept_K, -y)
+        _, new_F = sizes[1][1](kept_F, v)
+        new_x = full[:n, :n] @ x + full[:n, n] * commands[-1]
+        return np.concatenate([new_K, new_F, new_x, [v], commands[:-1]])
+
+    return float(np.abs(np.linalg.eigvals(np.column_stack([advanced(row) for row in np.eye(total)]))).max())
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_stable_is_what_the_closed_loop_poles_say(name: str) -> None:
+    """At random rates, input delays and true plants, with all methods: the loops are often unstable."""
+    random, design, seen = np.random.default_rng(len(name)), design_of(PLANTS[name]), []
+    for _ in range(2):
+        rate, delay = float(10 ** random.uniform(0.3, 1.6)), float(random.choice([0.0, 0.01]))
+        off = design.plant.__class__(
+            design.plant.gain * random.uniform(0.7, 1.6),
+            design.plant.zero_modes,
+            tuple(Mode(mode.omega * random.uniform(0.9, 1.1), mode.zeta) for mode in design.plant.pole_modes),
+            design.plant.delay_s * random.uniform(0.5, 1.5),
+            design.plant.integrators,
+            design.plant.real_zeros,
+            design.plant.real_poles,
+        )
+        for method in METHODS:
+            for plant in (design.plant, off):
+                drive = Drive(rate, method, FREE, input_delay_s=delay)
+                found = judge_loop(design, drive, plant)
+                if not found.refused:
+                    radius = spectral_radius(design, drive, plant)
+                    assert found.stable == (radius < 1), (method, rate, delay, radius)
+                    seen.append(found.stable)
+    assert True in seen
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_steady_error_is_that_of_a_long_run(method: str) -> None:
+    design = design_of(PLANTS["two integrators"])
+    drive = Drive(20.0, method, FREE)
+    true = PlantModel(2.1, (), (), 0.05, 2)
+    for omega in (1.5, 2.2):
+        judged = judge_loop(design, drive, true, [omega])
+        run = simulate_sampled(design, sinusoid(1.0, omega), None, drive, 120.0, true)
+        t, late = run.time_s, run.time_s > 100
+        waves = np.column_stack([np.sin(omega * t), np.cos(omega * t)])[late]
+        left = np.hypot(*np.linalg.lstsq(waves, run.error[late], rcond=None)[0])
+        assert judged.steady_errors[0] == pytest.approx(100 * left, rel=1e-5, abs=1e-9)
+
+
+def test_the_margin_is_the_least_distance_from_minus_one() -> None:
+    """Of T_d = 1 - S on a dense grid, S from the run's own impulse response."""
+    design, drive = design_of(PLANTS["none"]), Drive(30.0, "matched", FREE)
+    T, count = 1 / 30.0, 3000
+    forward, feedback, _, _ = controller_blocks(design, None, drive, "coprime")
+    (_, step_K), (_, step_F) = steps_of(forward), steps_of(feedback)
+    kept_K, kept_F = np.zeros(steps_of(forward)[0]), np.zeros(steps_of(feedback)[0])
+    P = plant_block(design.plant)
+    A, b, c, _ = zpk2ss(P.zeros, P.poles, P.gain)
+    n, late = len(A), design.plant.delay_s / T
+    whole, rest = math.floor(late), late - math.floor(late)
+    full, part = (expm(np.block([[A, b], [np.zeros((1, n + 1))]]) * t) for t in (T, (1 - rest) * T))
+    x, commands, errors = np.zeros(n), [0.0] * (whole + 1), []
+    for k in range(count):
+        y = float((c @ (part[:n, :n] @ x + part[:n, n] * commands[-1]))[0])
+        errors.append(float(k == 0) - y)
+        v = step_K(kept_K, errors[-1])[0] + step_F(kept_F, None)[0]
+        kept_K, kept_F = step_K(kept_K, errors[-1])[1], step_F(kept_F, v)[1]
+        x, commands = full[:n, :n] @ x + full[:n, n] * commands[-1], [v, *commands[:-1]]
+    S = np.abs(np.fft.rfft(errors, 2**16))
+    assert judge_loop(design, drive).modulus_margin == pytest.approx(1 / S.max(), rel=2e-2)
+
+
+def test_the_default_is_stable_where_a_method_is() -> None:
+    design = design_of(PLANTS["one integrator"])
+    for rate in (5.0, 20.0, 61.3):
+        first, *others = judge_methods(design, Drive(rate, "exact", FREE))
+        assert (first.method, first.stable) == ("matched", True)
+        assert first.steady_error < 1e-9
+        assert all(each.steady_error > 1e-4 for each in others)
+    drive, said = choose_method(design, Drive(61.3, "matched", FREE))
+    assert drive.method == "matched"
+    assert said.startswith("At 61.3 Hz with the method matched, which is chosen, the linear loop is stable, its steady")
+    drive, said = choose_method(design, Drive(61.3, "matched", FREE), "exact")
+    assert drive.method == "exact"
+    assert "the method exact the linear loop is UNSTABLE; matched: stable" in said
+
+
+def test_the_least_rate_parts_stable_from_unstable() -> None:
+    design = design_of(PLANTS["none"])
+    found = least_rate(design, Drive(1.0, "exact", FREE))
+    radii = [
+        spectral_radius(design, Drive(rate, "exact", FREE), design.plant)
+        for rate in (found.unstable_hz, found.stable_hz)
+    ]
+    assert radii[0] >= 1 > radii[1]
+    assert found.stable_hz < 1.002 * found.unstable_hz
