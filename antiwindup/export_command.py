@@ -14,7 +14,9 @@ from identification.base.axis_option import AXIS
 from identification.base.errors import InputError
 from identification.base.path_types import OUTPUT_FOLDER
 
-WRITERS = {"c": "c_code", "json": "json_file", "fmu": "fmu"}
+PLANT = {"matlab": "matlab", "simulink": "simulink", "python": "python_file"}
+"""Those that write the plant too."""
+WRITERS = {"c": "c_code", "json": "json_file", "fmu": "fmu"} | PLANT
 """Target -> its module in experiments.export, whose function ``files`` gives the content of each file by its name."""
 
 
@@ -52,7 +54,7 @@ def export(
     name: str,
     output: Path,
 ) -> None:
-    """Write DESIGN's controller with its anti-windup and limits: NAME.c and NAME.h, NAME.json or NAME.fmu.
+    """Write DESIGN's controller with its anti-windup and limits; with its plant for matlab, simulink and python.
 
     Beside it, NAME_test.csv is a run of `sampled` that its commands were checked against.
     """
@@ -74,7 +76,9 @@ def export(
     if not judge_loop(content, drive).stable:
         raise InputError(judgement)
     controller = sampled_controller(content, anti_windup, drive.limits, rate, drive.method, name)
-    choices = {"precision": precision} if to == "c" else {}
+    choices: dict[str, object] = {"precision": precision} if to == "c" else {}
+    if to in PLANT:
+        choices["plant"] = content.loop_plant
     files = import_module(f"experiments.export.{WRITERS[to]}").files(
         controller, check_run(content, controller), **choices
     )

@@ -66,6 +66,10 @@ COMMANDS = {
     "export": [
         *["antiwindup", "export", "{extended}", "--to", "c", "--rate", "2000", "--limit", "12", "--output", "{folder}"],
     ],
+    "check": [
+        *["antiwindup", "check", "{model}", *SWEEPS, "--against", "{extended}"],
+        *["--junit", "{folder}/c.xml", "--markdown", "{folder}/c.md"],
+    ],
     "explore": ["antiwindup", "explore", "{extended}", "--no-browser", "--output", "{folder}/d.json"],
     "refit": ["antiwindup", "refit", *SWEEPS, "--output", "{folder}/built"],
 }  # fmt: skip
@@ -81,6 +85,7 @@ FILES = {
     "bode": 4,
     "summary": 4,
     "export": 4,
+    "check": 2,
 }  # others one
 
 KEPT = ("c.parquet.parts/", "built/")  # so that the same command goes on
