@@ -240,6 +240,7 @@ REFERENCE = b"time_s,reference\n0,0\n1,2.5\n3,-1\n"
 
 LONG = (
     *("claims", "pid", "conditions", "limits", "campaign", "trade-off", "sampled-rates", "hidden-modes", "report"),
+    "rates",
     "equations",
 )
 """Commands that take long whatever their options."""

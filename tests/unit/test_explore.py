@@ -20,7 +20,9 @@ from design.chapter_2.design_delay_free import design_delay_free
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
 from experiments.engine.simulate import Run
+from identification.base.digits import percent
 from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
@@ -204,6 +206,18 @@ def test_chosen_pairs_move_with_a_and_a_guarantee_that_does_not_exist_is_refused
         explorer.run(explorer.start.changed({}, "global"))
 
 
+def test_an_unstable_plant_is_run_as_long_as_rounding_allows() -> None:
+    """Five periods of the reference would be 63 s; the pole is at 1 rad/s."""
+    plant = PlantModel(2.0, (), (), 0.02, 0, (), (-1.0,))
+    model = IdentifiedModel(plant, AdditiveBound(0.02, (), (), (), (30.0,)))
+    design = design_extended(model, [0.5])
+    explorer = Explorer(design, start_of(design))
+    assert explorer.run(explorer.start).time_s[-1] == pytest.approx(25.0)
+    for end in ("low", "high"):  # of the slider: neither is refused
+        sliders = {each.name: each for each in ranges(design, explorer.start)}
+        explorer.designed(explorer.start.changed({"recovery": (getattr(sliders["recovery"], end),)}).choices)
+
+
 def test_the_slow_part_judges_the_run_and_both_loops(explorer: Explorer) -> None:
     late = explorer.start.changed({"dead-time": (0.14,)})
     judged = explorer.judged(late)
@@ -219,6 +233,7 @@ def test_words() -> None:
     run = Run(time_s, np.array([0, 1, 2, np.nan, np.nan]), np.array([0, 1, 2, np.nan, np.nan]), {}, none, none)
     assert run_text(run) == "The run diverges near t = 0.75 s."
     assert run_text(replace(run, control=time_s, saturated_control=time_s)) == "The control stays within the limits."
+    assert [percent(share) for share in (0.0012, 0.994, 0.996, 1.0, 2.5)] == ["0.12", "99", "100", "100", "250"]
     assert table([("<b>", "1 & 2")]) == "<table><tr><th scope=row>&lt;b&gt;</th><td>1 &amp; 2</td></tr></table>"
     for name in ("$$x$$<img src=x>", r"\(x\)", r"\[x\]"):  # what Bokeh looks for
         assert not any(sign in without_tex(name) for sign in ("$$", r"\(", r"\["))
