@@ -7,13 +7,15 @@ from pathlib import Path
 
 import click
 
-from experiments.options import DESIGN, asked_limits
+from experiments.options import DESIGN, asked_limits, sinusoid_options
 from experiments.pair_options import NumberPair, PairCommand
+from identification.base.axis_option import AXIS
 from identification.base.files import is_there, require_writable
 from identification.base.path_types import OUTPUT_FILE
 
 
 @click.command("explore", cls=PairCommand)
+@AXIS
 @DESIGN
 @click.option(
     "--limit",
@@ -21,10 +23,7 @@ from identification.base.path_types import OUTPUT_FILE
     metavar="[LOW] HIGH",
     help="Limits that the page begins with; unless given, 1.2 times the control that the reference needs.",
 )
-@click.option(
-    "--amplitude", type=float, multiple=True, help="Of the reference, once a frequency of DESIGN; 1 unless given."
-)
-@click.option("--phase", type=float, multiple=True, help="In radians; once a frequency; pi/2, a crest, unless given.")
+@sinusoid_options
 @click.option("--port", type=click.IntRange(1024, 65535), help="Of 127.0.0.1; a free one unless given.")
 @click.option("--no-browser", is_flag=True, help="Open no browser; the address is printed in any case.")
 @click.option(
@@ -35,6 +34,7 @@ def explore(
     limit: tuple[float, ...] | None,
     amplitude: tuple[float, ...],
     phase: tuple[float, ...],
+    offset: float | None,
     port: int | None,
     no_browser: bool,
     output: Path | None,
@@ -43,20 +43,22 @@ def explore(
 
     All are redrawn as a slider is dragged. The page is for this machine alone, and ends with Ctrl-C. Its address holds
     what the sliders say, so that a copy of it opens the same page as long as the command runs; "save" writes the
-    design shown as design.json.
+    design shown as design.json. Without an amplitude the page begins with sinusoids of amplitude 1 at their crests.
     """
     import webbrowser
 
     from tqdm import tqdm
 
     from design.design_file import read_design
+    from experiments.asked_reference import sinusoids
     from paper_figures.explore.server import bound, serve
     from paper_figures.explore.state import start_of
 
-    target = output or _new_name(design)
-    require_writable(target, inputs=[design])
+    if output is not None:
+        require_writable(output, inputs=[design])
     content = read_design(design)
-    start = start_of(content, None if limit is None else asked_limits(limit), amplitude, phase)
+    reference = sinusoids(content, amplitude, phase, offset) if amplitude or phase or offset else None
+    start = start_of(content, None if limit is None else asked_limits(limit), reference)
 
     def tell(address: str) -> None:
         click.echo(address, err=True)  # at once: what a command prints appears when it is done
@@ -64,7 +66,7 @@ def explore(
             webbrowser.open(address)
 
     with tqdm(bar_format="Ctrl-C ends it", disable=None, leave=False):
-        serve(content, start, design, target, bound(port or 0), tell)
+        serve(content, start, design, output or _new_name(design), bound(port or 0), tell)
 
 
 def _new_name(design: Path) -> Path:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 
 import click
@@ -14,15 +14,14 @@ from identification.base.axis_option import AXIS
 from identification.base.errors import InputError
 from identification.base.path_types import OUTPUT_FOLDER
 
-WRITERS = {"c": "c_code", "json": "json_file", "fmu": "fmu"}
-"""Target -> its module in experiments.export, whose function ``files`` gives the content of each file by its name."""
+TARGETS = ("c", "matlab", "python", "json", "simulink", "fmu")
 
 
 @click.command("export", cls=PairCommand)
 @DESIGN
 @AXIS
 @click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
-@click.option("--to", type=click.Choice(list(WRITERS)), required=True, help="What is written.")
+@click.option("--to", type=click.Choice(TARGETS), required=True, help="What is written.")
 @LIMIT_PAIR
 @click.option(
     "--anti-windup",
@@ -52,7 +51,7 @@ def export(
     name: str,
     output: Path,
 ) -> None:
-    """Write DESIGN's controller with its anti-windup and limits: NAME.c and NAME.h, NAME.json or NAME.fmu.
+    """Write DESIGN's controller with its anti-windup and limits; with its plant for matlab, simulink and python.
 
     Beside it, NAME_test.csv is a run of `sampled` that its commands were checked against.
     """
@@ -60,6 +59,7 @@ def export(
     from experiments.drive.choose_method import choose_method
     from experiments.drive.judge_loop import judge_loop
     from experiments.drive.sampled_loop import METHODS, Drive
+    from experiments.export import c_code, fmu, json_file, matlab, python_file, simulink
     from experiments.export.check_run import check_run
     from experiments.export.controller import sampled_controller
     from experiments.export.names import require_name
@@ -74,10 +74,16 @@ def export(
     if not judge_loop(content, drive).stable:
         raise InputError(judgement)
     controller = sampled_controller(content, anti_windup, drive.limits, rate, drive.method, name)
-    choices = {"precision": precision} if to == "c" else {}
-    files = import_module(f"experiments.export.{WRITERS[to]}").files(
-        controller, check_run(content, controller), **choices
-    )
+    given, plant = (controller, check_run(content, controller)), content.loop_plant
+    writers: dict[str, Callable[[], Mapping[str, str | bytes]]] = {
+        "c": lambda: c_code.files(*given, precision),
+        "matlab": lambda: matlab.files(*given, plant),
+        "python": lambda: python_file.files(*given, plant),
+        "json": lambda: json_file.files(*given),
+        "simulink": lambda: simulink.files(*given, plant),
+        "fmu": lambda: fmu.files(*given),
+    }
+    files = writers[to]()
     write_whole({output / file: partial(_write, content=written) for file, written in files.items()}, [design])
     click.echo(f"{judgement}. {controller.promise}; {', '.join(files)} -> {output}")
 

@@ -55,6 +55,8 @@ COMMANDS = {
     ],
     "limits": ["experiments", "limits", "{extended}", "--limit", "12", *REFERENCE, "--output", "{folder}"],
     "compare": ["experiments", "compare", "{extended}", "--limit", "12", *REFERENCE, "--output", "{folder}"],
+    "tracking": ["experiments", "tracking", "{extended}", "--limit", "12", *REFERENCE, "--output", "{folder}"],
+    "rates": ["experiments", "rates", "{extended}", "--limit", "12", *REFERENCE, "--output", "{folder}"],
     "interpolation": ["experiments", "thesis", "interpolation", "{extended}", "--output", "{folder}"],
     "claims": ["experiments", "thesis", "claims", "--output", "{folder}", "--page", "{folder}/claims.md"],
     "draw": ["paper_figures", "draw", "fig_2_06", "--results", "{folder}", "--output", "{folder}"],
@@ -64,6 +66,10 @@ COMMANDS = {
     "export": [
         *["antiwindup", "export", "{extended}", "--to", "c", "--rate", "2000", "--limit", "12", "--output", "{folder}"],
     ],
+    "check": [
+        *["antiwindup", "check", "{model}", *SWEEPS, "--against", "{extended}"],
+        *["--junit", "{folder}/c.xml", "--markdown", "{folder}/c.md"],
+    ],
     "explore": ["antiwindup", "explore", "{extended}", "--no-browser", "--output", "{folder}/d.json"],
     "refit": ["antiwindup", "refit", *SWEEPS, "--output", "{folder}/built"],
 }  # fmt: skip
@@ -72,12 +78,14 @@ FILES = {
     "axis": 2,
     "limits": 2,
     "compare": 2,
+    "tracking": 2,
     "interpolation": 3,
     "claims": 2,
     "draw": 4,
     "bode": 4,
     "summary": 4,
     "export": 4,
+    "check": 2,
 }  # others one
 
 KEPT = ("c.parquet.parts/", "built/")  # so that the same command goes on

@@ -96,7 +96,7 @@ def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
     identified = read_model(model)
     tests = as_fitted(identified, read_sweeps(sweeps))
     found = read_refit(build)
-    with sentences_of(found.made, build / "results", "summary", model):
+    with sentences_of(found.files, build / "results", "summary", model):
         said = summarise(identified, tests, found)
         files = style.rendered(page.draw(said, identified, tests), build, "summary", said.text())
     style.write(files)

@@ -62,6 +62,7 @@ Maker = Callable[[random.Random, bool], Case]
 
 SIMULATE = ("--limit", "12", "--anti-windup", "corrected", "--amplitude", "50", "--until", "0.2", "--output", "run.csv")
 BODE = ("paper_figures", "bode", "model.json", "sweep.csv", "--output", "out")
+CHECK = ("antiwindup", "check", "model.json")
 SMALL = ("--modes", "1", "--real", "0", "--integrators", "1", "--bound-order", "1")
 
 
@@ -76,6 +77,7 @@ def sweeps(rng: random.Random, cheap: bool) -> Case:
         commands += [
             ("identification", "fit", name, *SMALL, "--output", "model_2.json", "--responses", "kept.npz"),
             ("experiments", "thesis", "additive-error", "model.json", name, "--output", "out"),
+            (*CHECK, name, "--junit", "check.xml", "--markdown", "check.md"),
             ("paper_figures", "bode", "model.json", name, "--output", "out"),
         ]
     return Case(rng.choice(commands), {**seeds.models(), name: damaged})
@@ -103,6 +105,7 @@ def models(rng: random.Random, cheap: bool) -> Case:
             ),
             ("paper_figures", "summary", "model.json", "sweep.csv", "--build", "out"),
             ("experiments", "thesis", "additive-error", "model.json", "sweep.csv", "--output", "out"),
+            (*CHECK, "sweep.csv"),
             BODE,
         ]
     return Case(rng.choice(commands), files)
@@ -237,6 +240,7 @@ REFERENCE = b"time_s,reference\n0,0\n1,2.5\n3,-1\n"
 
 LONG = (
     *("claims", "pid", "conditions", "limits", "campaign", "trade-off", "sampled-rates", "hidden-modes", "report"),
+    "rates",
     "equations",
 )
 """Commands that take long whatever their options."""

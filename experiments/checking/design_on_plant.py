@@ -29,18 +29,15 @@ class Promise:
     modulus
         Least modulus margin, which every plant within W_a leaves: modulus margin times 1 - ||W_a C S||; 0 where that
         says nothing.
-    guarantee
-        Of the corrected anti-windup: a name of :data:`design.choices.GUARANTEES`.
     sector
-        Least sector of the circle criterion: 1, whatever the control, of a guarantee that is no sector; of a sector
-        what is left of it for every plant within W_a. 0: nothing is guaranteed.
+        Least sector of the circle criterion for the corrected anti-windup: 1, whatever the control, of a guarantee that
+        is no sector; of a sector what is left of it for every plant within W_a. 0: nothing is guaranteed.
     missing
         Why nothing is, as a sentence without its full stop; else empty.
     """
 
     margins: Margins | str
     modulus: float
-    guarantee: str
     sector: float
     missing: str
 
@@ -72,19 +69,18 @@ def require_of_model(design: Design, model: IdentifiedModel) -> None:
 def promise(design: Design) -> Promise:
     """What a design has to keep, judged again and not read."""
     own = design.corrected
-    margins, modulus = _margins(design, design.plant), 0.0
-    if isinstance(margins, Margins):
-        modulus = margins.modulus.value * max(0.0, 1 - margins.W_a_C_S.value)
+    margins = _margins(design, design.plant)
+    if not isinstance(margins, Margins):
+        return Promise(margins, 0.0, 0.0, margins)
+    modulus = margins.modulus.value * max(0.0, 1 - margins.W_a_C_S.value)
     given = guarantee(design, own.kind)
     if not given.missing and own.guarantee == "sector":
         given = guarantee_within(design, own.kind)
     if given.missing:
-        return Promise(margins, modulus, own.guarantee, 0.0, given.missing)
+        return Promise(margins, modulus, 0.0, given.missing)
     # a delay-free design has no more on its own plant, whose dead time it ignores
-    on_model = on_plant(design, design.plant).sector
-    if on_model is None:
-        return Promise(margins, modulus, own.guarantee, 0.0, str(margins))
-    return Promise(margins, modulus, own.guarantee, min(given.sector, on_model, 1.0), "")
+    sector = min(given.sector, sector_with(design, own.kind, design.plant), 1.0)
+    return Promise(margins, modulus, sector, "")
 
 
 def on_plant(design: Design, true: PlantModel) -> OnPlant:

@@ -47,7 +47,8 @@ class NewSweep:
     def noise(self) -> Real:
         """(M,) standard deviations of the lines' errors; what neighbouring residuals share is no noise."""
         shared = self.fit.correlation if self.fit.misfit else 0.0
-        return np.asarray(self.sure.sigma * np.sqrt(1 - shared))
+        sigma = self.sure.sigma(self.fit.plant(1j * self.test.omega), self.test.excitation)
+        return np.asarray(sigma * np.sqrt(1 - shared))
 
     @property
     def freedom(self) -> int:

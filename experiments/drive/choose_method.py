@@ -10,6 +10,7 @@ import numpy as np
 
 from design.design_file import Design
 from experiments.drive.judge_loop import UNFOLLOWED, LoopJudgement, judge_loop
+from experiments.drive.matched_controller import is_matched
 from experiments.drive.sampled_loop import FORMS, METHODS, Drive
 from identification.model.plant import PlantModel
 
@@ -55,8 +56,13 @@ def judge_methods(
     omegas: Sequence[float] | None = None,
     form: str = FORMS[0],
 ) -> list[LoopJudgement]:
-    """:func:`judge_loop` with every method, the best first: stable, then of least steady error, then of most margin."""
-    found = [judge_loop(design, replace(drive, method=method), plant, omegas, form) for method in METHODS]
+    """The judgements with every method there is for the design, the best first.
+
+    That is a stable one of least steady error, and of the most margin among those whose steady errors are below
+    UNFOLLOWED.
+    """
+    methods = [method for method in METHODS if method != "matched" or is_matched(design)]
+    found = [judge_loop(design, replace(drive, method=method), plant, omegas, form) for method in methods]
     return sorted(found, key=lambda each: (max(each.steady_error, UNFOLLOWED), -each.modulus_margin))
 
 
@@ -121,13 +127,14 @@ def choose_method(
         not stable with the drive's method, also from which rate on it is.
     """
     found = judge_methods(design, drive, plant, omegas, form)
+    if method and method not in [each.method for each in found]:
+        found.append(judge_loop(design, replace(drive, method=method), plant, omegas, form))
     first = next((each for each in found if each.method == method), found[0])
-    others = [f"{each.method}: {each}" for each in found if each != first]
+    others = [f"; {each.method}: {each}" for each in found if each != first and not each.refused]
     why = "" if method else ", which is chosen,"
-    said = (
-        f"At {first.rate_hz:g} Hz with the method {first.method}{why} the linear loop is {first}; {'; '.join(others)}"
-    )
+    said = f"At {first.rate_hz:g} Hz with the method {first.method}{why} the linear loop is {first}{''.join(others)}"
     if not first.stable:
-        searched = (str(least_rate(design, replace(drive, method=each.method), plant, form)) for each in found)
+        sought = [first] if found[0].stable else found
+        searched = (str(least_rate(design, replace(drive, method=each.method), plant, form)) for each in sought)
         said += f". It is stable with {'; '.join(searched)}"
     return replace(drive, method=first.method), said

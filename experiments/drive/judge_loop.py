@@ -18,10 +18,12 @@ from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
 A_DECADE = 60  # frequencies, to begin with
-AROUND = np.concatenate([[0.0], np.geomspace(1e-2, 1e2, 41)])  # a root, in distances from the unit circle
+AROUND = np.geomspace(1e-2, 1e2, 41)  # a root, in distances from the unit circle
+ON_IT = 1e-6  # of its distance from 1: a root that is as near to the unit circle may be on it
 TURN = 0.5  # radians: between neighbouring frequencies the characteristic function turns by less
 FINEST = 40  # halvings of an interval of frequencies
 UNFOLLOWED = 1e-6  # % of the amplitude: smaller steady errors are alike
+PAST = 1e-11  # relative
 AT_REST = 1e-9  # radians: a constant, next to the integrators' poles
 
 
@@ -62,7 +64,7 @@ class LoopJudgement:
     def __str__(self) -> str:
         """What the loop does, a clause without its subject."""
         if self.refused:
-            return f"cannot run ({self.refused})"
+            return f"none that a computer can run ({self.refused})"
         if not self.stable:
             return "UNSTABLE"
         error, beside = _percent(self.steady_error), max(self.continuous_errors)
@@ -97,9 +99,10 @@ def judge_loop(
     -----
     With the held plant P_d z^-N, exact at the samples, and C_d = forward/(1 - feedback) the closed-loop poles are the
     zeros of f = 1 - feedback + forward P_d z^-N. The stable f g, where g = prod(1 - z_i/z) over the poles z_i of P_d
-    that are not inside the unit circle, has as many zeros outside it as it turns around 0 on it: the argument
-    principle, however long the dead time is. The turns are counted on frequencies that are refined until f g turns
-    by less than TURN between neighbours. The steady error is |(1 - feedback)/f|.
+    and of forward that are not inside the unit circle, has as many zeros outside it as it turns around 0 on it: the
+    argument principle, however long the dead time is. The turns are counted on frequencies that are refined until f g
+    turns by less than TURN between neighbours. The steady error is |(1 - feedback)/f|. An integrator that the
+    controller cancels, as that of chapter 2 does, is hidden and not judged.
     """
     true = design.loop_plant if plant is None else plant
     frequencies = tuple(design.reference_omegas if omegas is None else omegas)
@@ -121,7 +124,7 @@ def judge_loop(
 
 
 def _percent(error: float) -> str:
-    return "0" if error < UNFOLLOWED else f"{error:.2g} % of the amplitude"
+    return f"below {UNFOLLOWED:g} %" if error < UNFOLLOWED else f"{error:.2g} % of the amplitude"
 
 
 class _Loop:
@@ -131,26 +134,34 @@ class _Loop:
         self.T = 1 / drive.rate_hz
         self.forward, self.feedback, _, self.around = controller_blocks(design, None, drive, form)
         P_d, self.samples = held_plant(plant, self.T, drive.input_delay_s)
-        hidden = form == "thesis"  # then K has the integrators as zeros
-        outside = [pole for pole in plant_block(plant).unstable_poles if pole or not hidden]
+        outside, own = list(plant_block(plant).unstable_poles), Block(1.0)
+        if form == "thesis" or design.kind == "delay-free":  # integrators that the controller cancels are hidden
+            own = design.controller_parts()[0]
+            for _ in range(min(own.zeros.count(0j), outside.count(0j))):
+                outside.remove(0j)
         self.anchors = [image(pole, self.T) for pole in outside]
         self.plant = P_d * Block(1.0, tuple(self.anchors))
-        inside = np.linalg.eigvals
-        self.roots = np.concatenate(
-            [inside(self.forward.A), inside(self.feedback.A), 1 + self.T * np.array([*P_d.poles, *P_d.zeros])]
-        )
+        by_tustin = drive.method == "tustin"
+        moved = [pole / (1 - pole * self.T / 2) if by_tustin else image(pole, self.T) for pole in own.unstable_poles]
+        self.poles = [1 + self.T * pole for pole in moved]
+        roots = (np.linalg.eigvals(block.A) for block in (self.forward, self.feedback))
+        self.roots = np.concatenate([*roots, 1 + self.T * np.array([*P_d.poles, *P_d.zeros])])
 
     def parts(self, theta: Real) -> tuple[Complex, Complex]:
         """F g and (1 - feedback) g at angles (k,)."""
         z, w = np.exp(1j * theta), np.expm1(1j * theta) / self.T
-        g = np.prod([(w - anchor) * self.T / z for anchor in self.anchors], axis=0) if self.anchors else np.ones(len(z))
-        controlled = _response(self.forward, z) * self.plant(w) * (self.T / z) ** len(self.anchors) * z**-self.samples
-        rest = (1 - _response(self.feedback, z)) * g
-        return rest + controlled, rest
+        g, own = np.ones(len(z), dtype=complex), np.ones(len(z), dtype=complex)
+        for anchor in self.anchors:
+            g *= (w - anchor) * self.T / z
+        for pole in self.poles:
+            own *= 1 - pole / z
+        controlled = own * _response(self.forward, z) * self.plant(w) * (self.T / z) ** len(self.anchors)
+        rest = (1 - _response(self.feedback, z)) * g * own
+        return rest + controlled * z**-self.samples, rest
 
     def sensitivity(self, theta: float) -> complex:
-        """1/(1 + L) at an angle."""
-        f, rest = self.parts(np.array([max(theta, AT_REST)]))
+        """1/(1 + L) at an angle, as good as: poles of the controller on the unit circle are passed by."""
+        f, rest = self.parts(np.array([max(theta, AT_REST) * (1 + PAST)]))
         return complex(rest[0] / f[0])
 
     def stability(self) -> tuple[bool, float]:
@@ -178,8 +189,8 @@ class _Loop:
     def _angles(self) -> Real:
         """From far below every root to pi, denser around the roots of the blocks."""
         roots = self.roots[np.abs(self.roots) > 0]
-        place, distance = np.abs(np.angle(roots)), np.abs(np.log(np.abs(roots)))
-        apart = np.abs(np.log(roots))
+        place, apart = np.abs(np.angle(roots)), np.abs(np.log(roots))
+        distance = np.maximum(np.abs(np.log(np.abs(roots))), ON_IT * apart)
         lowest = 1e-3 * min([1.0, *apart[apart > 1e-12]])
         near = np.concatenate(
             [place[:, None] - distance[:, None] * AROUND, place[:, None] + distance[:, None] * AROUND]

@@ -64,8 +64,8 @@ def matched_controller(
     T, and at the plant's unstable poles. 1 + theta1~ goes by Tustin's rule, which keeps where it is positive real, and
     theta2 = P_d (1 + theta1~) is exact: y + y_d is the linear loop's response at the samples.
     """
-    T, parameters, fastest = sample_time_s, design.parameters, max(design.reference_omegas)
-    if not isinstance(parameters, ExtendedParameters) or parameters.inverse_epsilon:
+    T, fastest = sample_time_s, max(design.reference_omegas)
+    if not is_matched(design):
         raise InputError(
             "the method matched is for an extended design with the exact inverse of the plant; expected tustin or exact"
         )
@@ -82,13 +82,18 @@ def matched_controller(
     if form == "thesis":
         forward, feedback = K_d, _sampled(realize(T_d), [samples], T)
     else:
-        forward, feedback = _coprime(design.plant, K_d, T_d, parameters.a, samples, T)
+        forward, feedback = _coprime(design.plant, K_d, T_d, design.free.a, samples, T)
     theta = realize(Block(0.0), Block(0.0))
     if anti_windup is not None:
         one_plus = _by_tustin(anti_windup.one_plus, plant_block(design.plant).unstable_poles, T)
         both = realize(one_plus, one_plus * P_d)
         theta = StateSpace(both.A, both.b, both.C, both.d - [1.0, 0.0])
     return _sampled(realize(forward), [0], T), feedback, _sampled(theta, [0, samples], T)
+
+
+def is_matched(design: Design) -> bool:
+    """Whether the method is for a design: an extended one with the exact inverse of the plant."""
+    return isinstance(design.parameters, ExtendedParameters) and not design.parameters.inverse_epsilon
 
 
 def _forward(design: Design, P_d: Block, samples: int, T: float) -> Block:

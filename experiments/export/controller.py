@@ -61,7 +61,7 @@ class SampledController:
     rate_hz
         Samples a second.
     method
-        One of :data:`experiments.drive.difference_equations.METHODS`.
+        One of :data:`experiments.drive.sampled_loop.METHODS`.
     limits
         (sigma_1, sigma_2) of the command; either may be infinite.
     anti_windup

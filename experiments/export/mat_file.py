@@ -47,7 +47,8 @@ def mat_file(controller: SampledController, run: CheckRun, plant: PlantModel) ->
         },
     }
     written = BytesIO()
-    savemat(written, content, oned_as="row")
+    file: Any = written  # scipy takes files, which its types do not say
+    savemat(file, content, oned_as="row")
     return HEADER.ljust(DATED) + written.getvalue()[DATED:]
 
 

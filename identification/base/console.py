@@ -28,7 +28,7 @@ class Console(click.Group):
     """
 
     def __call__(self, *args: Any, **kwargs: Any) -> NoReturn:
-        printed = io.StringIO()
+        printed = io.TextIOWrapper(io.BytesIO(), "utf-8", "surrogatepass", newline="", write_through=True)
         status: Any = 0
 
         def work() -> None:
@@ -44,7 +44,7 @@ class Console(click.Group):
             status = error.exit_code
             with suppress(OSError):  # nobody is told, but by the status
                 error.show()
-        _print(printable_lines(printed.getvalue()))
+        _print(printable_lines(printed.buffer.getvalue().decode("utf-8", "surrogatepass")))
         _flush_errors(status)
         process.done()
         sys.exit(status)

@@ -32,7 +32,7 @@ def _rounded(value: float, digits: int, rounding: str) -> str:
 
 def percent(share: float) -> str:
     """A share in percent: two digits, or whole numbers from 100."""
-    return f"{100 * share:.2g}" if share < 1 else f"{100 * share:.0f}"
+    return f"{100 * share:.2g}" if share < 0.995 else f"{100 * share:.0f}"
 
 
 def showing_difference(found: float, expected: float) -> tuple[str, str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.base.arrays import Complex, Real
+from identification.fitting.grouped_lines import grouped
 from identification.fitting.least_squares import log_jacobian, response_of, stacked
 from identification.fitting.likelihood import noise_levels
 from identification.fitting.one_fit import OneFit
@@ -27,17 +28,23 @@ class Sureness:
         (p, p), from residuals that are noise.
     freedom
         (p,) degrees of freedom of Student's distribution that each parameter's error over its standard error follows.
-    sigma
-        (M,) standard deviations of the lines' complex errors, E|error|^2 = sigma^2.
+    floor, relative
+        a and b of the noise E|error|^2 = (a^2 + b^2 |P|^2) excitation; a in the response's unit.
     """
 
     covariance: Real
     freedom: Real
-    sigma: Real
+    floor: float
+    relative: float
+
+    def sigma(self, response: Complex, excitation: Real | None) -> Real:
+        """Standard deviations (M,) of the complex errors of lines with this response of the plant."""
+        variance = self.floor**2 + self.relative**2 * np.abs(response) ** 2
+        return np.sqrt(variance if excitation is None else variance * excitation)
 
 
 def sureness(fit: OneFit, test: FrequencyResponse) -> Sureness:
-    """How sure a fit by least squares is, with the noise levels corrected for what the fit takes out of the residuals.
+    """How sure a fit is, with the noise levels corrected for what the fit takes out of the residuals.
 
     Parameters
     ----------
@@ -50,14 +57,17 @@ def sureness(fit: OneFit, test: FrequencyResponse) -> Sureness:
     small and with them the noise that is estimated there. The residual of line m keeps 1 - h_m of the noise's
     variance, h_m being its leverage; divided by that, residuals give the noise levels a^2 and b^2 of
     :func:`identification.fitting.likelihood.noise_levels`. The variance of a parameter is a function of these two,
-    whose own covariance gives the degrees of freedom (Satterthwaite, Biometrics Bull. 2, 1946).
+    whose own covariance gives the degrees of freedom (Satterthwaite, Biometrics Bull. 2, 1946). Of very many lines
+    groups stand for them, see :func:`identification.fitting.grouped_lines.grouped`. Errors of a soft-L1 fit come out
+    larger than they are where there are outliers.
     """
-    structure, omega = fit.structure, test.omega
+    structure, lines = fit.structure, grouped(alias_free(test, fit.plant))
+    omega = lines.omega
     size = structure.free  # a dead time that is not asked for is no parameter
-    excitation = np.ones_like(omega) if test.excitation is None else test.excitation
+    excitation = np.ones_like(omega) if lines.excitation is None else lines.excitation
     model = response_of(structure, fit.theta, omega)
     derivatives = (model[:, None] * log_jacobian(structure, fit.theta, omega))[:, :size]
-    error, power = np.abs(fit.sign * alias_free(test, fit.plant).response - model) ** 2, np.abs(model) ** 2
+    error, power = np.abs(fit.sign * lines.response - model) ** 2, np.abs(model) ** 2
     a2, b2 = fit.floor**2, fit.relative**2
     for _ in range(ROUNDS):
         rows, inverse, _ = _inverted(derivatives, (a2 + b2 * power) * excitation)
@@ -73,7 +83,8 @@ def sureness(fit: OneFit, test: FrequencyResponse) -> Sureness:
     freedom = 2 * np.diag(inverse) ** 2 / np.einsum("ik,ij,jk->k", slopes, of_levels, slopes)
     covariance = np.zeros((structure.size, structure.size))
     covariance[:size, :size] = inverse * np.outer(units, units) / 2  # of complex errors: half in each part
-    return Sureness(covariance, np.append(freedom, [np.inf] * (structure.size - size)), np.sqrt(variance))
+    freedom = np.append(freedom, [np.inf] * (structure.size - size))
+    return Sureness(covariance, freedom, float(np.sqrt(a2)), float(np.sqrt(b2)))
 
 
 def _inverted(derivatives: Complex, variance: Real) -> tuple[Real, Real, Real]:

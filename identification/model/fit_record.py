@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from identification.base.errors import InputError, shown
 from identification.base.json_object import (
     Reader,
     member,
@@ -132,7 +133,7 @@ class FittedTest:
             "PlantModel": lambda members, key: plant,
             "Numbers": lambda members, key: from_shape(plant, member(members, key)),
             "Noise": lambda members, key: record(Noise, member(members, key)),
-            "tuple[float, float]": numbers,
+            "tuple[float, float]": _band,
             "tuple[str, ...]": texts,
         }
         return record(cls, content, readers)
@@ -240,7 +241,9 @@ class FitRecord:
         def values(of: Mapping[str, Any], key: str) -> Numbers:
             return from_shape(plant, member(of, key))
 
-        ends = member(content, "intervals_95")
+        ends, tests = member(content, "intervals_95"), objects(content, "tests")
+        if not tests:
+            raise InputError("'tests' is empty; expected one test or more")
         return cls(
             source=words(content, "source"),
             synthetic=truth(content, "synthetic"),
@@ -256,13 +259,20 @@ class FitRecord:
             agreement_of_tests=or_none(number)(content, "agreement_of_tests"),
             median_distances=numbers(content, "median_distances"),
             cautions=texts(content, "cautions"),
-            tests=tuple(FittedTest.from_dict(test) for test in objects(content, "tests")),
+            tests=tuple(FittedTest.from_dict(test) for test in tests),
             bound=BoundReport.from_dict(member(content, "bound"), bound),
             checks={words(each, "test"): SubspaceCheck.from_dict(each) for each in objects(content, "subspace_check")},
             covariance=None
             if content.get("covariance") is None
             else Covariance.from_dict(member(content, "covariance"), len(plant.parameters)),
         )
+
+
+def _band(content: Mapping[str, Any], key: str) -> tuple[float, float]:
+    found = numbers(content, key)
+    if len(found) != 2 or not 0 < found[0] <= found[1]:
+        raise InputError(f"{shown(key)} is {shown(found)}; expected two frequencies in rad/s, the lower one first")
+    return found[0], found[1]
 
 
 def _by_name(content: Mapping[str, Any], key: str) -> dict[str, float]:

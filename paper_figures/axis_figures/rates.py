@@ -40,8 +40,8 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
         "error of the last period over the sampling rate. The controller is made again for samples ('matched', "
         "triangles), or its blocks are discretised by Tustin's rule (circles) or as they answer an input that is held "
         f"for a sample (squares); broad, in continuous time; dotted, {band}, which is 1 % "
-        "of the reference's amplitude; less than a millionth of it is drawn as that. With the corrected anti-windup the error comes to stay within as much of that "
-        f"in continuous time by {said}.{_divergent(table)}"
+        "of the reference's amplitude; less than a millionth of it is drawn as that. With the corrected anti-windup "
+        f"the error comes to stay within 1 % of the amplitude of that in continuous time by {said}.{_divergent(table)}"
     )
 
 

@@ -23,7 +23,7 @@ from experiments.runs.compare_anti_windups import run_all, span
 from experiments.runs.design_loop import design_loop
 from experiments.runs.guarantee import guarantee
 from experiments.runs.references import Reference
-from experiments.runs.region import require_short, require_within_region
+from experiments.runs.region import longest_run, require_within_region
 from experiments.runs.sector_promise import judge_run
 from experiments.runs.simulate_design import PERIODS
 from identification.base.arrays import Real
@@ -173,9 +173,8 @@ class Explorer:
     def _run(self, state: State) -> Run:
         """The saturated run from rest; NaN from where it diverges. Raises InputError as a simulation does."""
         design, plant, reference = self.designed(state.choices), self.true_plant(state.true), state.reference
-        until_s = PERIODS * span(design, reference)
+        until_s = min(PERIODS * span(design, reference), longest_run(plant))
         require_within_region(plant, reference, state.limits)
-        require_short(plant, until_s)
         loop = design_loop(design, reference, "corrected", plant)
         return run_all({"run": loop}, state.limits, np.linspace(0.0, until_s, SAMPLES))["run"]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from design.anti_windup.corrected_compensator import SETTLED
 from design.design_file import Design
 from design.stability.margins import delay_loop, margins_of
 from identification.base.errors import InputError
@@ -59,19 +60,22 @@ def ranges(design: Design, state: State) -> list[Range]:
     """
     signals = design.signals
     found = [_range("limit", None, f"limits of {signals.input}", *_around_zero(*state.limits))]
-    many = len(state.amplitudes) > 1
+    many, unit = len(state.amplitudes) > 1, f" [{signals.output_unit}]" if signals.output_unit else ""
+    largest = FOURFOLD * max(map(abs, state.amplitudes)) or 1.0
     for index, omega in enumerate(state.choices.reference_omegas):
         of = f" {index + 1}" if many else ""
-        largest = FOURFOLD * max(map(abs, state.amplitudes)) or 1.0
-        unit = f" [{signals.output_unit}]" if signals.output_unit else ""
         found.append(_range("amplitude", index, f"reference amplitude{of}{unit}", 0.0, largest))
         if omega:
             title = f"reference frequency{of} [rad/s]"
             found.append(_range("phase", index, f"reference phase{of} [rad]", -math.pi, math.pi))
             found.append(_range("reference-omega", index, title, omega / FOURFOLD, omega * FOURFOLD))
-    for name, title in (("a", "a, pole of the loop [rad/s]"), ("recovery", "recovery of the anti-windup, at most [s]")):
-        for value in state.numbers[name]:
-            found.append(_range(name, 0, title, value / FOURFOLD, value * FOURFOLD))
+    if 0.0 not in state.choices.reference_omegas:  # whose amplitude is a constant already
+        found.append(_range("offset", 0, f"reference offset{unit}", -largest, largest))
+    for a in state.numbers["a"]:
+        found.append(_range("a", 0, "a, pole of the loop [rad/s]", a / FOURFOLD, a * FOURFOLD))
+    recovery_s, fastest_s = state.choices.recovery_s, math.log(1 / SETTLED) / design.corrected.bandwidth
+    title = "recovery of the anti-windup, at most [s]"
+    found.append(_range("recovery", 0, title, max(recovery_s / FOURFOLD, fastest_s), recovery_s * FOURFOLD))
     least, most, late = _tolerated(design)
     found.append(_range("gain", 0, "true plant: gain / model's", least, most))
     if design.plant.zero_modes or design.plant.pole_modes:

@@ -73,8 +73,8 @@ class State:
         Of the design, and of the true plant.
     limits
         (lower, upper) of the actuator, in the unit of the plant's input.
-    amplitudes, phases_rad
-        Of the reference, one for each of its frequencies, in the output's unit and in radians.
+    amplitudes, phases_rad, offset
+        Of the reference; of the first two one for each of its frequencies, in the output's unit and in radians.
 
     Raises
     ------
@@ -87,6 +87,7 @@ class State:
     limits: tuple[float, float]
     amplitudes: tuple[float, ...]
     phases_rad: tuple[float, ...]
+    offset: float
 
     def __post_init__(self) -> None:
         for name, values in self.numbers.items():
@@ -109,6 +110,7 @@ class State:
             "limit": self.limits,
             "amplitude": self.amplitudes,
             "phase": self.phases_rad,
+            "offset": (self.offset,),
             "reference-omega": choices.reference_omegas,
             "a": () if choices.a is None else (choices.a,),
             "recovery": (choices.recovery_s,),
@@ -120,7 +122,7 @@ class State:
     @property
     def reference(self) -> Reference:
         """r(t)."""
-        return Reference(self.amplitudes, self.choices.reference_omegas, self.phases_rad, 0.0)
+        return Reference(self.amplitudes, self.choices.reference_omegas, self.phases_rad, self.offset)
 
     @property
     def query(self) -> str:
@@ -138,15 +140,10 @@ class State:
         )
         choices = Choices(every["reference-omega"], a, recovery_s, guarantee or self.choices.guarantee)
         true = TruePlant(gain, mode_frequency, delay_s)
-        return State(choices, true, (low, high), every["amplitude"], every["phase"])
+        return State(choices, true, (low, high), every["amplitude"], every["phase"], *every["offset"])
 
 
-def start_of(
-    design: Design,
-    limits: tuple[float, float] | None = None,
-    amplitudes: Sequence[float] = (),
-    phases_rad: Sequence[float] = (),
-) -> State:
+def start_of(design: Design, limits: tuple[float, float] | None = None, reference: Reference | None = None) -> State:
     """The state that a page begins with: the design as it is, and its own model as the true plant.
 
     Parameters
@@ -155,30 +152,25 @@ def start_of(
         Of either kind.
     limits
         Unless given, +-1.2 times the most that the control of perfect tracking reaches; +-1 where that needs none.
-    amplitudes, phases_rad
-        One for each frequency of the design; unless given 1, and all sinusoids at their crests as the run begins: a
-        start that saturates most loops.
+    reference
+        Of the frequencies of the design. Unless given, sinusoids of amplitude 1, all at their crests as the run begins:
+        a start that saturates most loops.
 
     Raises
     ------
     InputError
-        There are not as many of each as the design has frequencies, or see :class:`State`.
+        See :class:`State`.
     """
     omegas, parameters = design.reference_omegas, design.parameters
-    amplitudes, phases = tuple(amplitudes) or (1.0,) * len(omegas), tuple(phases_rad) or (math.pi / 2,) * len(omegas)
+    r = reference or Reference((1.0,) * len(omegas), omegas, (math.pi / 2,) * len(omegas), 0.0)
     if limits is None:
-        needed = Reference(amplitudes, omegas, phases, 0.0).required(design.loop_plant).at_most
+        needed = r.required(design.loop_plant).at_most
         most = ROOM * needed if 0 < needed < math.inf else 1.0
         limits = -most, most
     a = parameters.a if isinstance(parameters, ExtendedParameters) else None
     choices = Choices(omegas, a, design.corrected.judgement.recovery_s, design.corrected.guarantee)
-    state = State(choices, TruePlant(1.0, 1.0, design.loop_plant.delay_s), limits, amplitudes, phases)
-    if not len(amplitudes) == len(phases) == len(omegas):
-        raise InputError(
-            f"there are {len(amplitudes)} amplitudes and {len(phases)} phases; expected one of each for each of the "
-            f"{len(omegas)} frequencies of the design"
-        )
-    return state
+    true = TruePlant(1.0, 1.0, design.loop_plant.delay_s)
+    return State(choices, true, limits, r.amplitudes, r.phases_rad, r.offset)
 
 
 def from_words(words: Mapping[str, Sequence[str]], start: State) -> State:

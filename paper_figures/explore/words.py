@@ -40,7 +40,7 @@ def true_plant_text(true: TruePlant, model: TruePlant) -> str:
             changes.append(f"the frequencies of its modes times {true.mode_frequency:.4g}")
         if true.delay_s != model.delay_s:
             changes.append(f"a dead time of {true.delay_s:.4g} s instead of {model.delay_s:.4g} s")
-        said = f"the design's model with {', '.join(changes)}"
+        said = f"the design's model with {' and '.join(changes)}"
     return f"True plant: {said}. All is computed, nothing measured."
 
 

@@ -66,22 +66,52 @@ def _do(found: Found, signals: Signals) -> Iterator[str]:
         yield _limits(tracking, found.made.get("limits_extended"), signals)
     if rates is not None:
         yield from _discretise(rates, best, signals)
+    delay_free = found.design("design_delay_free")
+    if delay_free is not None and not _unusable(delay_free):
+        late = f"with the plant's dead time of {duration(delay_free.plant.delay_s)}" if delay_free.plant.delay_s else ""
+        yield f"The controller of design_delay_free.json is stable {late or 'on this plant'} too."
 
 
 def _do_not(found: Found, signals: Signals) -> Iterator[str]:
     design, delay_free = found.design("design"), found.design("design_delay_free")
     if design is not None:
         yield from _harm(design, found)
+        yield from _without(design, found, signals)
     rates = found.made.get("rates")
     if design is not None and rates is not None:
         yield from _avoid(rates, best_anti_windup(design, found), signals)
-    if delay_free is not None and delay_free.plant.delay_s:
-        count = roots_right_of(delay_loop(delay_free, delay_free.plant), 0.0)
-        if count:
-            yield (
-                "Do not use the controller of design_delay_free.json: with the plant's dead time of "
-                f"{duration(delay_free.plant.delay_s)} its loop is unstable ({count} roots in the right half plane)."
-            )
+    if delay_free is not None and (why := _unusable(delay_free)):
+        yield f"Do not use the controller of design_delay_free.json: {why}."
+
+
+def _unusable(delay_free: Design) -> str:
+    """Why a design that ignores the dead time does not do for the plant; empty where it does."""
+    if not delay_free.blocks["K"].is_stable:
+        return "it is unstable by itself and diverges when the actuator saturates"
+    late = delay_free.plant.delay_s
+    count = roots_right_of(delay_loop(delay_free, delay_free.plant), 0.0) if late else 0
+    if not count:
+        return ""
+    roots = f"{count} root{'s' if count > 1 else ''} in the right half plane"
+    return f"with the plant's dead time of {duration(late)} its loop is unstable ({roots})"
+
+
+def _without(design: Design, found: Found, signals: Signals) -> Iterator[str]:
+    """What becomes of the run without anti-windup, where it is worse."""
+    tracking = found.made.get("tracking")
+    if tracking is None or best_anti_windup(design, found) == "none":
+        return
+    none, own = (
+        abs(of_run(tracking, run, "offset")) + of_run(tracking, run, "ripple") for run in ("none", "corrected")
+    )
+    if math.isnan(none):
+        yield "Do not leave the anti-windup out: without it the run under the reference diverges."
+    elif none > (1 + SAME) * own and of_run(tracking, "none", "last_saturation_s") != 0:
+        unit = signals.output_unit
+        yield (
+            f"Do not leave the anti-windup out: without it an error of {with_unit(none, unit)} is left in the last "
+            f"period of the run, with it {with_unit(own, unit)}."
+        )
 
 
 def best_anti_windup(design: Design, found: Found) -> str:
@@ -150,7 +180,7 @@ def _limits(tracking: pd.DataFrame, best: pd.DataFrame | None, signals: Signals)
         )
         return f"The limits {within} suffice for this reference: {takes}{used}; {reached}."
     forced = 0.0 if best is None else float(best["periodic_lower"].iloc[0])
-    leaves = f" and leaves an error of {with_unit(forced, signals.output_unit)} or more" if forced > 0 else ""
+    leaves = f": each leaves an error of {with_unit(forced, signals.output_unit)} or more" if forced > 0 else ""
     remedy = f" to {number(100 / share, 2)} % of its size, or widen the limits {number(share)} times"
     return (
         f"Make the reference smaller{'' if math.isnan(share) else remedy}: the limits {within} do NOT suffice, "
@@ -220,12 +250,13 @@ def _assumed(axis: pd.DataFrame | str | None, signals: Signals) -> Iterator[str]
 
 def _to_come(found: Found) -> Iterator[str]:
     """What a refit has not yet come to."""
-    missing = [name for name in DESIGNS if name not in found.designs]
-    if "design" in missing and found.axis is None:
-        yield "This is the fit alone; designs and runs follow."
-    elif missing and not isinstance(found.axis, str):
-        yield "Designs and runs follow."
-    elif found.design("design") is not None:
-        rest = [FOLLOWS[name] for name in TABLES if name not in found.tables]
-        if rest:
-            yield f"Still to come: {', '.join(rest)}."
+    if isinstance(found.axis, str):
+        return
+    if "design" not in found.designs:
+        yield f"{'This is the fit alone; designs' if found.axis is None else 'Designs'} and runs follow."
+        return
+    rest = [said for name, said in DESIGNS.items() if name not in found.designs]
+    if found.design("design") is not None:
+        rest += [FOLLOWS[name] for name in TABLES if name not in found.tables]
+    if rest:
+        yield f"{'; '.join(rest)}."

@@ -50,6 +50,11 @@ class Found:
     tables: Mapping[str, pd.DataFrame | str] = field(default_factory=dict)
 
     @property
+    def files(self) -> dict[str, pd.DataFrame]:
+        """The tables that were not refused by the names of their files."""
+        return {f"{name}{TABLES[name].removesuffix('.csv')}": table for name, table in self.made.items()}
+
+    @property
     def made(self) -> dict[str, pd.DataFrame]:
         """The tables that were not refused."""
         return {name: table for name, table in self.tables.items() if isinstance(table, pd.DataFrame)}

@@ -141,10 +141,10 @@ def _panels(
 
 
 def _heading(summary: Summary, size: float) -> Block:
-    said = [Piece(0, summary.title, weight="bold")]
+    lines = [(Piece(0, summary.title, weight="bold"),)]
     if summary.synthetic:
-        said.append(Piece(WIDTH - 2 * MARGIN, summary.synthetic, "right", "bold", SYNTHETIC))
-    return Block(size + 1, (tuple(said),))
+        lines.append((Piece(0, summary.synthetic, weight="bold", color=SYNTHETIC),))
+    return Block(size + 1, tuple(lines))
 
 
 def _table(table: Table, size: float) -> Block:

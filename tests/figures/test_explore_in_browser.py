@@ -61,7 +61,8 @@ def served(extended_design: Design, tmp_path_factory: pytest.TempPathFactory) ->
     folder = tmp_path_factory.mktemp("explore")
     design = Design(**vars(extended_design) | {"signals": Signals("motor current", "A", "<b>elevation</b>", "deg")})
     (folder / "design.json").write_text(design.to_json(), encoding="utf-8")
-    words = ["antiwindup", "explore", "design.json", "--no-browser", "--limit", "12", "--amplitude", "50"]
+    (folder / "axis.toml").write_text("limit = 12\namplitude = 50\nphase = 1.5\n", encoding="utf-8")
+    words = ["antiwindup", "explore", "design.json", "--no-browser", "--axis", "axis.toml"]
     process = subprocess.Popen(
         [sys.executable, "-m", *words],
         cwd=folder,

@@ -1,4 +1,4 @@
-"""The one page on a plant: what it says, that all of it is on the page, legible, and the same bytes every time."""
+"""The one page on a plant: what it says to do, that all is on the page, legible, and the same bytes every time."""
 
 from __future__ import annotations
 
@@ -10,177 +10,94 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner, Result
+from made_up_fit import RICH, SIMPLE, design_of, model_of, plant_of, sweeps_of
 from matplotlib.figure import Figure
 
 from data.thesis import model_named
-from design.anti_windup.compensator import second_order
-from design.anti_windup.judge import CorrectedCompensator, Judgement, PrintedCompensator
-from design.blocks.block import Block
 from design.design_file import Design
-from design.hinf.mixed_sensitivity import Synthesis
-from design.parameters import DelayFreeParameters, ExtendedParameters, RollOff
 from identification.base.errors import InputError
 from identification.model.additive_bound import AdditiveBound
-from identification.model.fit_record import Criterion, FitRecord, FittedTest, Noise
-from identification.model.model_file import IdentifiedModel
+from identification.model.fit_record import Criterion
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
-from identification.model.reports import BoundReport, Excess, ModeCheck, SubspaceCheck, Touch
-from identification.model.structure import Structure
-from identification.sweeps.response import FrequencyResponse
+from identification.model.reports import ModeCheck, SubspaceCheck
+from identification.model.signals import Signals
 from paper_figures.__main__ import main
 from paper_figures.look import style
 from paper_figures.summary import page
-from paper_figures.summary.of_designs import sentences
+from paper_figures.summary.advice import advice
+from paper_figures.summary.build_folder import Found
 from paper_figures.summary.of_fit import parameter_table
 from paper_figures.summary.words import Summary, summarise
 
-NO_INTEGRATOR = "the plant has 0 integrators; the design expects exactly one, Eq. (2.20)"
-SIMPLE = AdditiveBound.printed_form(0.3, 40.0, 60.0, 0.2)
-RICH = AdditiveBound(0.3, (Mode(20.0, 0.4),), (Mode(15.0, 0.3), Mode(70.0, 0.2)), (40.0,), ())
+SIGNALS = Signals("valve current", "mA", "level", "cm")
+REFUSED = "where W_a is as large as the plant, no controller is robust"
+NAN = np.nan
 
 
-def plant_of(modes: int, integrators: int = 1, poles: int = 0) -> PlantModel:
-    return PlantModel(
-        2.0,
-        tuple(Mode(20.0 * 1.5**i, 0.05) for i in range(modes)),
-        tuple(Mode(25.0 * 1.5**i, 0.04) for i in range(modes)),
-        0.004,
-        integrators,
-        real_poles=(12.5,) * poles,
-    )
-
-
-def sweeps_of(plant: PlantModel, count: int, synthetic: bool = False) -> list[FrequencyResponse]:
-    omega = np.geomspace(5.0, 400.0, 60)
-    response = plant(1j * omega)
-    return [
-        FrequencyResponse(omega, response * (1.02 + 0.01 * i + 0.01 * np.sin(40 * omega)), None, f"day_{i}.csv")
-        if not synthetic
-        else FrequencyResponse(omega, 1.1 * response, None, f"day_{i}.csv", synthetic=True)
-        for i in range(count)
-    ]
-
-
-def record_of(plant: PlantModel, tests: list[FrequencyResponse], bound: AdditiveBound) -> FitRecord:
-    zeros, poles = (
-        2 * len(modes) + len(rates)
-        for modes, rates in ((plant.zero_modes, plant.real_zeros), (plant.pole_modes, plant.real_poles))
-    )
-    structure = Structure(plant.integrators, zeros, poles)
-
-    def share(part: float) -> tuple[float, ...]:
-        return tuple(part * parameter.value for parameter in plant.parameters)
-
-    return FitRecord(
-        source="identification fit",
-        synthetic=any(test.synthetic for test in tests),
-        structure=str(structure),
-        method="maximum likelihood",
-        loss="least squares",
-        criterion=Criterion("BIC", 1.0, {str(structure): 5.0, "1 integrator": 99.0}, str(structure)),
-        lower=share(0.98),
-        upper=share(1.02),
-        noise=share(0.003),
-        misfit=share(0.0),
-        scatter=share(0.01) if len(tests) > 1 else None,
-        agreement_of_tests=1e-9 if len(tests) > 1 else None,
-        median_distances=(0.012,) * len(tests),
-        cautions=("no dead time can be told from none",) if plant.delay_s == 0 else (),
-        tests=tuple(
-            FittedTest(
-                name=test.name,
-                lines=test.omega.size,
-                plant=plant,
-                standard_errors=share(0.003),
-                noise=Noise(2e-4, 0.0125),
-                chi_square=1.02,
-                residual_correlation=0.03,
-                median_distance=0.012,
-                sha256=None,
-                synthetic=test.synthetic,
-                band=(float(test.omega[0]), float(test.omega[-1])),
-                left_out=(),
-                remarks=(),
-                conjugated=False,
-            )
-            for test in tests
-        ),
-        bound=BoundReport(
-            bound, 12.5, 3.25, 11.75, Excess(1.0, 1.0, 1.0), None, (Touch(55.5, tests[0].name, False, 1.0),)
-        ),
-        checks={},
-    )
-
-
-def model_of(plant: PlantModel, tests: list[FrequencyResponse], bound: AdditiveBound = SIMPLE) -> IdentifiedModel:
-    return IdentifiedModel(plant, bound, None, record_of(plant, tests, bound))
-
-
-def design_of(kind: str) -> Design:
-    judged = Judgement(0.0625, 50.0, None, 0.0, 48.5, False, None, 0.125)
-    delay_free = kind == "delay-free"
-    return Design(
-        kind=kind,
-        plant=plant_of(1),
-        additive_bound=SIMPLE,
-        reference_omegas=(1.5,),
-        blocks={"K": Block(1.0, (), (1 + 0j,)), "C0": Block(1.0), "T_so": Block(1.0, (), (-4 + 0j, -1 + 2j, -1 - 2j))},
-        hinf=Synthesis(0.3125, "", 0.375, 0.5, 0.3125, "", 0.375, Block(1.0), Block(1.0)) if delay_free else None,
-        parameters=DelayFreeParameters(4.0, 1e-4) if delay_free else ExtendedParameters(4.0, (), "zeros", 0.0, {}),
-        thesis=PrintedCompensator(second_order(0.03, 0.02, 48.5), judged, 0.03, 0.02, 48.5),
-        corrected=CorrectedCompensator(
-            second_order(0.5, 0.5, -1.0),
-            replace(judged, popov_sector=1.0, theta2_stable=True, recovery_s=1.75),
-            "sector",
-            "",
-            0.75,
-            275.0,
-            0.03125,
-            None,
-        ),
-    )
-
-
-DESIGNS: dict[str, Design | str] = {"delay_free": design_of("delay-free"), "extended": design_of("extended")}
-
-
-def outcomes() -> dict[str, pd.DataFrame | str]:
+def tracking(limits: tuple[float, float] = (-6.5, 6.5), steady: float = 4.25, last: float = 3.125) -> pd.DataFrame:
     rows = [
-        {
-            **{
-                "run": run,
-                "limit": 6.5,
-                "required": 7.25,
-                "last_saturation_s": last,
-                "peak_error_after_1s": 4.5,
-            },
-            "relative_error_percent": error,
-            **{"guaranteed_sector": sector, "needed_sector": np.inf, "largest_control": 123.5},
-            **{"covered_control": 17.25, "covered": 0},
-        }
-        for run, last, error, sector in (
-            ("none", np.nan, np.nan, np.nan),
-            ("thesis", np.nan, 62.5, 0.0),
-            ("corrected", 3.125, 0.75, 0.875),
-        )
+        {"run": run, "last_saturation_s": last, "offset": offset, "ripple": 0.125, "relative_error_percent": 1.5}
+        | {"asked_control": 12.5, "covered_control": 17.25, "largest_control": 12.75, "covered": 1}
+        for run, offset in (("none", 0.75), ("corrected", 0.0))
     ]
+    facts = {"lower_limit": limits[0], "limit": limits[1], "steady_least": -steady, "steady_greatest": steady}
+    return pd.DataFrame(rows).assign(**facts, linear_control=9.5, span_s=4.0)
+
+
+def compared(none: float = 2.5, corrected: float = 1.25) -> pd.DataFrame:
+    times = {"none": none, "corrected": corrected}
+    return pd.DataFrame(
+        [{"run": run, "upset": upset, "recovery_s": times[run]} for upset in ("start", "pulse") for run in times]
+    )
+
+
+def rates(asked: float = NAN, **errors: list[float]) -> pd.DataFrame:
+    """Of both runs at 100, 200 and 400 Hz; an infinite error is a loop that is not stable."""
+    every = {"matched": [0.01, 0.01, 0.01], "tustin": [0.5, 0.125, 0.03], "exact": [37.0, 3.5, 0.5]} | errors
+    rows = [{"run": run, "method": "continuous", "rate_hz": NAN, "steady_error": 0.01, "stable": 1} for run in RUNS]
+    rows += [
+        {"run": run, "method": method, "rate_hz": rate, "steady_error": error, "stable": int(np.isfinite(error))}
+        for run in RUNS
+        for method, of_method in every.items()
+        for rate, error in zip((100.0, 200.0, 400.0), of_method, strict=True)
+    ]
+    return pd.DataFrame(rows).assign(asked_hz=asked, amplitude=10.0, quantum=0.0)
+
+
+RUNS = ("none", "corrected")
+LIMITS = pd.DataFrame({"periodic_lower": [0.375]})
+AXIS = pd.DataFrame(
+    [
+        {"key": "limit", "value": "-6.5 6.5", "source": "chosen", "why": "ASSUMED: none were given"},
+        {"key": "amplitude", "value": "10", "source": "given", "why": ""},
+    ]
+)
+
+
+def tables() -> dict[str, pd.DataFrame | str]:
+    drawn = pd.DataFrame({"plants": [200]})
     return {
-        **dict.fromkeys(("delay_free", "extended"), pd.DataFrame(rows)),
-        "f_gamma": pd.DataFrame([{"f_best": 0.03125}]),
+        "tracking": tracking(),
+        "compare": compared(),
+        "rates": rates(),
+        "limits_extended": LIMITS,
+        "campaign": drawn,
     }
+
+
+def found_of(design: Design | None = None, **others: pd.DataFrame | str) -> Found:
+    designs = {"design": design or design_of("extended"), "design_delay_free": REFUSED}
+    return Found(AXIS, designs, tables() | others)
 
 
 def page_of(
     plant: PlantModel, count: int, bound: AdditiveBound = SIMPLE, refused: bool = False, synthetic: bool = False
 ) -> tuple[Summary, Figure]:
     tests = sweeps_of(plant, count, synthetic)
-    model = model_of(plant, tests, bound)
-    said = (
-        summarise(model, tests, dict.fromkeys(DESIGNS, NO_INTEGRATOR), {})
-        if refused
-        else summarise(model, tests, DESIGNS, outcomes())
-    )
+    model = model_of(plant, tests, bound, SIGNALS)
+    found = Found(AXIS, {"design": REFUSED, "design_delay_free": REFUSED}) if refused else found_of()
+    said = summarise(model, tests, found)
     return said, page.draw(said, model, tests)
 
 
@@ -219,7 +136,7 @@ def test_all_is_on_the_page_and_legible(arguments, extents):
 def test_page_and_text_hold_the_same_cells(arguments):
     said, figure = page_of(*arguments)
     page, text = {line.get_text() for line in figure.texts}, said.text()
-    tables = [said.parameters, *([said.loops] if said.loops else [])]
+    tables = [said.parameters, *([said.runs] if said.runs else [])]
     cells = {cell for table in tables for row in table.rows for cell in row if cell}
     assert {cell for cell in cells if "omega" not in cell} <= page
     assert all(cell in text for cell in cells)
@@ -228,8 +145,18 @@ def test_page_and_text_hold_the_same_cells(arguments):
 
 
 FULL_PAGE = """
+Level over valve current: plant with
 SYNTHETIC DATA: 2 of 2 tests
-gain K 2.000 1.960 to 2.040 0.006 0.02
+Do: Use the controller of design.json with the anti-windup 'corrected'
+stays below 17.2 mA; under this reference it reached 12.8 mA, no more.
+The limits +-6.5 mA suffice for this reference: following the reference takes -4.25 to 4.25 mA, 65 % of the way
+the loop asks for up to 9.5 mA, and they act.
+by the method 'matched' at 100 Hz or more
+Avoid: Do not leave the anti-windup out: without it an error of 0.875 cm is left in the last period of the run, with
+Do not use Tustin's rule below 400 Hz: at 200 Hz the steady error is 0.125 cm.
+Do not use held-input discretisation at any rate up to 400 Hz: at 400 Hz the steady error is 0.5 cm.
+Assumed: limit = -6.5 to 6.5 mA: ASSUMED: none were given.
+gain K [cm/(mA s)] 2.000 1.960 to 2.040 0.006 0.02
 0.0500 0.0490 to 0.0510
 2 tests in day_0.csv, day_1.csv; 120 lines from 5 to 400 rad/s
 Its BIC is 94 better than that of the next best, 1 integrator.
@@ -239,45 +166,131 @@ noise of 1.2 % of the response
 W_a = 0.3 (1 + s/40) / (1 + 2 0.2 s/60 + (s/60)^2)
 3.25 times their envelope on average and 12.5 times at most (no bound of this order gets below 11.7)
 It touches day_0.csv at 55.5 rad/s
-= 0.375, no stabilising controller below 0.3125. K itself is UNSTABLE
-poles of T_so -1+2j, -1-2j, -4
-gamma = 48.5 by (2.23); corrected, guarantee sector 0.75, recovery in 1.75 s
-The least f of (2.23) found over beta is 0.0312
-exceeds the limits of +-6.5
-no anti-windup diverges
-thesis's anti-windup 0.0625 any NOT stable none to the end
-1 stable LEFT 3.12 s 4.5 0.75 %
-Chapter 2: With the corrected anti-windup the run is NOT covered by its guarantee, since the reference takes more
+run last at a limit [s] most asked for [mA]
+without anti-windup 3.12 12.5 0.875 1.5
+anti-windup corrected 3.12 12.5 0.125 1.5
 """
 
 
 def test_numbers_and_sentences_of_a_full_page():
     words = " ".join(page_of(plant_of(1), 2, synthetic=True)[0].text().split())
     assert [part for part in FULL_PAGE.strip().splitlines() if part not in words] == []
-    assert "Refused" not in words
+    assert words.count("Refused") == 1
+    assert "To come" not in words
 
 
-def test_refusals_stand_in_their_place_with_what_is_not_drawn():
+def advised(found: Found) -> dict[str, str]:
+    plant = plant_of(1)
+    return dict(advice(model_of(plant, sweeps_of(plant, 1), signals=SIGNALS), found))
+
+
+CASES = {
+    "limits that do not suffice": (
+        {"tracking": tracking(steady=8.125)},
+        "Do",
+        "Make the reference smaller to 80 % of its size, or widen the limits 1.25 times: the limits +-6.5 mA do NOT "
+        "suffice, following the reference takes -8.12 to 8.12 mA, so that no controller follows it: each leaves an "
+        "error of 0.375 cm or more.",
+    ),
+    "limits above 0": (
+        {"tracking": tracking((0.5, 3.0), 2.5)},
+        "Do",
+        "Make the reference smaller: the limits 0.5 to 3 mA do NOT suffice",
+    ),
+    "limits that are never reached": ({"tracking": tracking(last=0.0)}, "Do", "the control never reaches them."),
+    "an anti-windup that does harm": (
+        {"compare": compared(1.25, 2.5)},
+        "Avoid",
+        "Do not use the anti-windup 'corrected': from rest it recovers after 2.5 s, without anti-windup the loop "
+        "recovers after 1.25 s.",
+    ),
+    "one that never recovers": ({"compare": compared(1.25, NAN)}, "Avoid", "after a disturbance it recovers never"),
+    "a loop that is not stable": (
+        {"rates": rates(exact=[np.inf, np.inf, 0.01])},
+        "Avoid",
+        "Do not use held-input discretisation below 400 Hz: at 200 Hz the loop is unstable.",
+    ),
+    "the computer's own rate": (
+        {"rates": rates(200.0)},
+        "Do",
+        "At your rate of 200 Hz the steady error is 0.01 cm by the method 'matched', 0.125 cm by Tustin's rule, 3.5 cm "
+        "by held-input discretisation.",
+    ),
+    "no rate": (
+        {"rates": rates(matched=[5.0] * 3, tustin=[5.0] * 3)},
+        "Do",
+        "Look for a faster computer or a slower reference: by no method does the controller come within 1 %",
+    ),
+    "what is not there yet": ({}, "", ""),
+}
+
+
+@pytest.mark.parametrize(("others", "head", "part"), CASES.values(), ids=CASES)
+def test_the_advice_follows_from_the_runs(others, head, part):
+    said = advised(found_of(**others))
+    assert not part or part in said[head]
+    plain = advised(found_of())
+    assert all(part not in sentence for sentence in plain.values()) or not part
+
+
+def test_a_run_that_does_harm_takes_the_anti_windup_back():
+    worse = replace(design_of("extended"), compared=("corrected is WORSE than no anti-windup under the limits +-1",))
+    for said in (advised(found_of(worse)), advised(found_of(compare=compared(1.25, 2.5)))):
+        assert "design.json without anti-windup" in said["Do"]
+    assert "corrected': is WORSE than no anti-windup under the limits +-1." in advised(found_of(worse))["Avoid"]
+
+
+@pytest.mark.parametrize(
+    ("guarantee", "part"),
+    [
+        ("global", "stays within them (guaranteed for the fitted plant)"),
+        ("robust", "stays within them (guaranteed for every plant within the bound W_a)"),
+    ],
+)
+def test_what_is_guaranteed_is_said(guarantee, part):
+    design = design_of("extended")
+    own = replace(design, corrected=replace(design.corrected, guarantee=guarantee, sector=None))
+    assert part in advised(found_of(own))["Do"]
+
+
+def test_a_delay_free_design_is_judged_with_the_dead_time(delay_free_design, implied):
+    """The printed delay-free loop has no dead time; with half a second it is unstable, and K may be so by itself."""
+    stable = replace(delay_free_design.blocks["K"], poles=(-1 + 0j,), zeros=(), gain=1e-6)
+    blocks = {**delay_free_design.blocks, "K": stable}
+    late = replace(delay_free_design, plant=replace(implied.plant, delay_s=0.5))
+
+    def said(design: Design) -> dict[str, str]:
+        return advised(Found(AXIS, {"design": design_of("extended"), "design_delay_free": design}, tables()))
+
+    assert delay_free_design.blocks["K"].is_stable
+    assert "with the plant's dead time of 500 ms its loop is unstable" in said(late)["Avoid"]
+    soon = replace(late, plant=replace(late.plant, delay_s=1e-9))
+    assert "design_delay_free.json is stable with the plant's dead time of 1 ns too." in said(soon)["Do"]
+    unstable = replace(late, blocks=blocks | {"K": replace(stable, poles=(1 + 0j,))})
+    assert "it is unstable by itself and diverges" in said(unstable)["Avoid"]
+
+
+def test_the_page_says_what_is_still_to_come():
+    alone = advised(Found())
+    assert set(alone) == {"To come"}
+    assert alone["To come"] == "This is the fit alone; designs and runs follow."
+    assert advised(Found(AXIS))["To come"] == "Designs and runs follow."
+    part = {name: table for name, table in tables().items() if name not in ("rates", "campaign")}
+    said = advised(Found(AXIS, dict.fromkeys(("design", "design_delay_free"), design_of("extended")), part))
+    assert said["To come"] == "the runs on a computer; the plants within W_a."
+
+
+def test_refusals_stand_at_the_end_each_with_what_it_is():
     plant = plant_of(1)
     tests = sweeps_of(plant, 1)
-    results = outcomes() | {"f_gamma": "f-gamma will not"}
-    said = summarise(model_of(plant, tests), tests, DESIGNS | {"delay_free": NO_INTEGRATOR}, results)
+    found = Found(AXIS, {"design": design_of("extended"), "design_delay_free": REFUSED}, tables() | {"rates": "no"})
+    said = summarise(model_of(plant, tests), tests, found)
     assert said.refused == (
-        ("Chapter 2", f"Refused: {NO_INTEGRATOR}. Not drawn: Fig. 2.12 to 2.14, A.4."),
-        ("Chapters 3, 4", "Refused: f-gamma will not. Not drawn: Fig. 2.10, 2.11."),
+        ("Refused", f"The delay-free design: {REFUSED}."),
+        ("Refused", "The runs on a computer: no."),
     )
-    assert [head for head, _ in said.designs] == ["Chapter 2", "Chapters 3, 4", "Chapters 3, 4"]
-    assert said.loops is not None
-    assert all(row[0].startswith("Chapters 3, 4") for row in said.loops.rows)
-
-
-def test_nothing_tried_is_nothing_said():
-    plant = plant_of(1)
-    tests = sweeps_of(plant, 1)
-    said = summarise(model_of(plant, tests), tests, {}, {})
-    assert said.designs == said.refused == ()
-    assert said.loops is None
-    assert "how tests would differ is not known" in said.text()
+    assert said.runs is not None
+    assert "Run it on a computer" not in said.text()
 
 
 def test_what_the_fit_leaves_is_said():
@@ -299,7 +312,7 @@ def test_what_the_fit_leaves_is_said():
             "day_2.csv": SubspaceCheck(4, 0.01, (), "too short"),
         },
     )
-    text = " ".join(summarise(replace(model, fit=fit), tests, {}, {}).text().split())
+    text = " ".join(summarise(replace(model, fit=fit), tests, Found()).text().split())
     for part in (
         "differ by no more: tests of one plant would differ as much with a probability of 0.5",
         "No other structure was tried. The deviance is divided by 19.5",
@@ -316,7 +329,7 @@ def test_what_the_fit_leaves_is_said():
 def test_long_lists_of_files_are_cut():
     plant = plant_of(1)
     tests = sweeps_of(plant, 9)
-    text = summarise(model_of(plant, tests), tests, {}, {}).text()
+    text = summarise(model_of(plant, tests), tests, Found()).text()
     assert "9 tests in day_0.csv, day_1.csv, ..., day_8.csv;" in text
 
 
@@ -337,9 +350,9 @@ def test_model_of_other_tests_or_of_none_is_refused():
     plant = plant_of(1)
     tests = sweeps_of(plant, 2)
     with pytest.raises(InputError, match=r"fitted to day_0.csv, day_1.csv; expected these sweeps"):
-        summarise(model_of(plant, tests), tests[:1], {}, {})
+        summarise(model_of(plant, tests), tests[:1], Found())
     with pytest.raises(InputError, match="holds no fit that this version reads; expected one that it fitted to sweeps"):
-        summarise(model_named("implied"), tests, {}, {})
+        summarise(model_named("implied"), tests, Found())
 
 
 def test_lines_are_broken_at_words_and_symbols_are_set():
@@ -362,8 +375,8 @@ def build(tmp_path: Path) -> Path:
     (tmp_path / "day_0.csv").write_text("omega,real,imag\n" + "\n".join(rows) + "\n", encoding="utf-8")
     (tmp_path / "model.json").write_text(model_of(plant, [test]).to_json(), encoding="utf-8")
     (tmp_path / "results").mkdir()
-    (tmp_path / "design_delay_free.refused.txt").write_text(f"{NO_INTEGRATOR}.\n", encoding="utf-8")
-    (tmp_path / "design_extended.refused.txt").touch()
+    (tmp_path / "design.refused.txt").write_text(f"{REFUSED}.\n", encoding="utf-8")
+    (tmp_path / "design_delay_free.refused.txt").touch()
     return tmp_path
 
 
@@ -376,7 +389,7 @@ def summary(build: Path) -> Result:
 def test_command_reads_what_was_made_and_refused_and_writes_the_same_bytes_twice(build):
     result = summary(build)
     assert result.exit_code == 0, result.output
-    said = f"Chapter 2: Refused: {NO_INTEGRATOR}. Not drawn: Fig. 2.12 to 2.14, A.4."
+    said = f"Refused: The extended design: {REFUSED}."
     assert result.output == f"1 test -> {build / 'summary.pdf'}\n{said}\n"
     assert said in " ".join((build / "summary.txt").read_text(encoding="utf-8").split())
     first = {path.suffix: path.read_bytes() for path in build.glob("summary.*")}
@@ -386,12 +399,13 @@ def test_command_reads_what_was_made_and_refused_and_writes_the_same_bytes_twice
 
 
 def test_command_refuses_what_it_cannot_read(build):
-    (build / "design_extended.json").write_text(design_of("extended").to_json(), encoding="utf-8")
-    (build / "results" / "extended_summary.csv").write_text("run,limit\nnone,1\n", encoding="utf-8")
+    (build / "design.refused.txt").unlink()
+    (build / "design.json").write_text(design_of("extended").to_json(), encoding="utf-8")
+    (build / "results" / "tracking_summary.csv").write_text("run,limit\nnone,1\n", encoding="utf-8")
     result = summary(build)
     assert result.exit_code == 2
-    path = build / "results" / "extended_summary.csv"
-    assert result.output == f"Error: {path}: no column guaranteed_sector, which summary needs\n"
+    path = build / "results" / "tracking_summary.csv"
+    assert result.output.startswith(f"Error: {path}: no column ")
     (build / "day_0.csv").unlink()
     assert "no such file" in summary(build).output
     assert not list(build.glob("summary.*"))
@@ -409,22 +423,3 @@ def test_panels_show_tests_model_and_bound():
     letters = [text.get_text() for panel in (magnitude, phase, figure.axes[1], relative) for text in panel.texts]
     assert letters == ["(a)", "(b)", "(c)", "(d)"]
     assert all(a < b for a, b in pairwise(letters))
-
-
-def test_the_robust_redesign_in_words() -> None:
-    plain = design_of("extended")
-    design = replace(plain, parameters=replace(plain.free, roll_off=RollOff(0.9, 2, 45.5)))
-    table = pd.DataFrame(
-        {
-            "run": ["design_extended", "design_robust"],
-            "peak": [7.25, 0.875],
-            "delay_least_s": [0.0, 0.0015],
-            "delay_greatest_s": [0.155, 0.144],
-        }
-    )
-    said = sentences(design, "robust", {"robustness": table})
-    for part in ("2 more poles of T_so at 45.5 rad/s", "= 0.875, where that design has 7.25", "1.5 ms to 144 ms"):
-        assert part in said
-    assert sentences(design, "robust", {}).endswith("45.5 rad/s.")
-    as_it_is = replace(plain, parameters=replace(plain.free, roll_off=RollOff(0.9, 0, 45.5)))
-    assert sentences(as_it_is, "robust", {}) == "As the design of chapters 3, 4."

@@ -26,7 +26,8 @@ STEPS = {step.command: step for step in (*BEFORE, *report_steps(ASKED, BEFORE), 
 
 def words(command: tuple[str, ...]) -> str:
     """The room, the command, and the figure."""
-    return " ".join(command[: 3 if command[1] in ("thesis", "draw") else 2])
+    several = command[1] in ("thesis", "draw") or command[:2] == ("paper_figures", "axis")
+    return " ".join(command[: 3 if several else 2])
 
 
 COMMANDS = {words(command): command for command in STEPS}
@@ -67,6 +68,8 @@ for command in commands:
         for node in function.body:
             if isinstance(node, (ast.Import, ast.ImportFrom)):
                 exec(compile(ast.Module([node], []), command, "exec"))
+        if (room, words[0]) == ("paper_figures", "axis"):
+            importlib.import_module("paper_figures.axis_figures." + words[1])
         if words[0] == "draw":
             importlib.import_module("paper_figures.thesis.figures." + words[1])
         if words[-1] == "claims":

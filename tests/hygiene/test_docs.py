@@ -24,6 +24,7 @@ ROOMS = ("identification", "design", "experiments", "paper_figures")
         ("campaigns.md", 4),
         ("designs.md", 12),
         ("closed_loop.md", 8),
+        ("explore.md", 7),
         ("errata.md", 30),
         ("unprinted_conditions.md", 3),
     ],

@@ -98,6 +98,7 @@ BY_NAME = {
     "experiments/thesis/claims/equations_page.py",
     "experiments/thesis/claims/ledger.py",
     "identification/base/faces.py",
+    "paper_figures/axis_figures/registry.py",
     "paper_figures/thesis/figure_registry.py",
 }
 """The modules that import what a text names."""

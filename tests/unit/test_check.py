@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +29,7 @@ from identification.base.errors import InputError
 from identification.fit_model import fit
 from identification.fitting.same_structure import fit_same_structure
 from identification.fitting.small_sample import sureness
-from identification.model.model_file import IdentifiedModel
+from identification.model.model_file import IdentifiedModel, read_model
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 from identification.model.structure import Structure
@@ -309,6 +310,16 @@ def test_a_model_without_a_fit_is_compared_with_its_bound_alone(
     status, said = check(bare, bench / "same.csv")
     assert status == 0
     assert said.startswith("Nothing to do: the sweep lies within W_a; not told: parameters\n")
+
+
+@pytest.mark.parametrize("change", [{"tests": []}, {"band": [0.0, 9.0]}, {"band": [9.0]}])
+def test_a_fit_that_does_not_say_where_it_was_made_is_none(
+    bench: Path, tmp_path: Path, change: dict[str, list[float]]
+) -> None:
+    content = json.loads((bench / "model.json").read_text(encoding="utf-8"))
+    content["fit"] |= {"tests": [each | change for each in content["fit"]["tests"]]} | change
+    (tmp_path / "model.json").write_text(json.dumps(content), encoding="utf-8")
+    assert read_model(tmp_path / "model.json").fit is None
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from importlib.metadata import version
 
@@ -57,3 +60,12 @@ def test_an_option_is_the_same_in_every_command() -> None:
     several = {name: kinds for name, kinds in found.items() if len(kinds) > 1 and name not in SAME}
     assert not several
     assert not {"--period", "--slew"} & set(found)
+
+
+def test_a_shell_completes_commands_and_options() -> None:
+    """As click documents it; what a command prints passes through a buffer of ours, which takes bytes too."""
+    asked = {"COMP_WORDS": "antiwindup design extended --reference-", "COMP_CWORD": "3"}
+    environment = os.environ | asked | {"_ANTIWINDUP_COMPLETE": "bash_complete"}
+    run = [sys.executable, "-c", "import sys, antiwindup; sys.argv = ['antiwindup']; antiwindup.main()"]
+    said = subprocess.run(run, env=environment, capture_output=True, text=True, check=False)
+    assert (said.stdout, said.stderr) == ("plain,--reference-hz\nplain,--reference-omega\n", "")

@@ -167,7 +167,7 @@ def test_it_is_the_loop_of_a_computer_that_does_not_know_the_slewing(extended_de
     reference, errors = sinusoid(50.0, 1.5, 0.4), []
     loop = design_loop(extended_design, reference, kind)
     for rate_hz in (2000.0, 16000.0):
-        drive = Drive(rate_hz, "tustin", (-9.0, 12.0), slew=60.0)
+        drive = Drive(rate_hz, "tustin", (-9.0, 12.0), rate_limit=60.0)
         sampled = simulate_sampled(extended_design, reference, kind, drive, 2.0)
         run = simulate(loop, (-9.0, 12.0), sampled.time_s, rate=60.0)
         errors.append(np.abs(run.outputs["output"] - sampled.output).max())
