@@ -118,6 +118,9 @@ def _asked(
 ) -> tuple[Asked, dict[str, Any]]:
     """What a build is for, with files that are there; and how it is run."""
     from antiwindup.steps import Asked
+    from antiwindup.worker import prepare
+
+    prepare()
     from design.asked_model import asked_model
     from identification.sweeps.read_sweeps import input_files
 

@@ -7,6 +7,8 @@ import os
 import sys
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
+from multiprocessing.forkserver import ensure_running
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
@@ -30,6 +32,18 @@ PACKAGES = [
 """What takes long to import."""
 
 
+def prepare() -> None:
+    """Begin to load the packages, in the process from which the others are forked, while this one does something else.
+
+    Where that process cannot begin, :func:`start` says why.
+    """
+    os.environ["PYTHONSAFEPATH"] = "1"  # the processes import nothing from the folder that they happen to run in
+    if "forkserver" in multiprocessing.get_all_start_methods():
+        multiprocessing.get_context("forkserver").set_forkserver_preload(PACKAGES)
+        with undisturbed, suppress(OSError):
+            ensure_running()
+
+
 def start(command: Sequence[str], log: Path, journal: Path) -> BaseProcess:
     """Start ``antiwindup COMMAND...``; what it prints goes to a file. When this process ends, so does that one.
 
@@ -47,10 +61,9 @@ def start(command: Sequence[str], log: Path, journal: Path) -> BaseProcess:
     InputError
         No process can be started.
     """
+    prepare()
     has_server = "forkserver" in multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("forkserver") if has_server else multiprocessing.get_context("spawn")
-    os.environ["PYTHONSAFEPATH"] = "1"  # the processes import nothing from the folder that they happen to run in
-    context.set_forkserver_preload(PACKAGES)
     process: BaseProcess = context.Process(target=_run, args=(tuple(command), str(log), journal))
     try:
         with undisturbed:
