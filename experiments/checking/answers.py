@@ -74,7 +74,7 @@ def answers_of_sweep(found: ModelCheck, sweep: SweepCheck) -> Iterator[Answer]:
         return
     bound = _bound(found, (sweep.at_lines, sweep.between_lines))
     yield answer("within W_a", *bound)
-    yield answer("parameters", *_parameters(sweep.moves, found.share))
+    yield answer("parameters", *_parameters(sweep, found.share))
     if found.promise is not None and sweep.design is not None:
         yield answer("margins", *_margins(found.promise, sweep.design, bound[0] is Outcome.HOLDS))
         yield answer("guarantee", *_guarantee(found.promise, sweep.design))
@@ -96,20 +96,24 @@ def _bound(found: ModelCheck, looked: Sequence[Reach]) -> tuple[Outcome, str]:
     )
 
 
-def _parameters(moves: Sequence[Move] | None, share: float) -> tuple[Outcome, str]:
-    if moves is None:
+def _parameters(sweep: SweepCheck, share: float) -> tuple[Outcome, str]:
+    if sweep.moves is None:
         return Outcome.OPEN, "the model does not say how sure its parameters are, so that only W_a was compared"
-    largest = sorted(moves, key=lambda move: move.chance)
+    largest = sorted(sweep.moves, key=lambda move: move.chance)
     moved = [move for move in largest if move.chance < share]
-    untold = sum(not move.could_be_told for move in moves)
+    untold = sum(not move.could_be_told for move in sweep.moves)
+    new = ""
+    if sweep.new_at is not None:
+        new = f"; the sweep shows what the model's structure does not have, near {sweep.new_at / (2 * pi):.4g} Hz"
     if moved:
         words = ", ".join([f"{named(moved[0].parameter)} moved {_by(moved[0])}", *map(_also, moved[1:NAMED])])
-        return Outcome.MOVED, words + (f", and {len(moved) - NAMED} more" if len(moved) > NAMED else "")
-    if untold == len(moves):
+        return Outcome.MOVED, words + (f", and {len(moved) - NAMED} more" if len(moved) > NAMED else "") + new
+    if untold == len(sweep.moves) and not new:
         return Outcome.OPEN, "the model's tests differ too much, or the sweep is too noisy, to tell a move of any"
     rest = f"; of {untold} no move could be told" if untold else ""
     first = largest[0]
-    return Outcome.HOLDS, f"none moved by more than chance; {_also(first)} comes nearest{rest}"
+    none = f"none moved by more than chance; {_also(first)} comes nearest{rest}{new}"
+    return Outcome.MOVED if new else Outcome.HOLDS, none
 
 
 def named(parameter: Parameter) -> str:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from design.design_file import Design
 from experiments.checking.design_on_plant import OnPlant, Promise, on_plant, promise, require_of_model
 from experiments.checking.new_sweep import NewSweep, fitted, lines_to_check
 from experiments.checking.parameter_moves import Move, moves
 from experiments.checking.within_bound import Reach, reach_at_lines, reach_between_lines
+from identification.model.fit_record import FitRecord
 from identification.model.model_file import IdentifiedModel
 from identification.sweeps.response import FrequencyResponse
 
@@ -33,8 +36,9 @@ class SweepCheck:
         Of each parameter; None where the model does not say how sure its own are, or without a fit.
     design
         What the design has on the fitted plant; None without a fit or a design.
-    more_left
-        Whether neighbouring residuals correlate by more than chance, which those of the model's tests did not.
+    new_at
+        Frequency in rad/s near which the sweep shows what the model's structure does not have: neighbouring residuals
+        of its fit correlate by more than chance and more than those of the model's tests. None where they do not.
     """
 
     name: str
@@ -45,7 +49,7 @@ class SweepCheck:
     between_lines: Reach | None = None
     moves: tuple[Move, ...] | None = None
     design: OnPlant | None = None
-    more_left: bool = False
+    new_at: float | None = None
 
 
 @dataclass(frozen=True)
@@ -111,5 +115,11 @@ def _checked(model: IdentifiedModel, test: FrequencyResponse, design: Design | N
         between_lines=reach_between_lines(model, sweep),
         moves=None if model.fit is None else moves(model, model.fit, sweep, share),
         design=None if design is None else on_plant(design, sweep.fit.plant),
-        more_left=sweep.fit.misfit > 0 and model.fit is not None and not any(model.fit.misfit),
+        new_at=None if model.fit is None else _new_at(model.fit, sweep),
     )
+
+
+def _new_at(record: FitRecord, sweep: NewSweep) -> float | None:
+    before = max(test.residual_correlation for test in record.tests)
+    by_chance = 3 / np.sqrt(sweep.fit.lines)  # 4.2 standard deviations
+    return sweep.fit.worst_omega if sweep.fit.correlation > max(before, 0.0) + by_chance else None

@@ -8,7 +8,6 @@ from math import inf, isinf, pi
 from design.stability.margins import Margins
 from experiments.checking.answers import Outcome, answers, answers_of_sweep, relative
 from experiments.checking.check_model import ModelCheck, SweepCheck
-from experiments.checking.new_sweep import NewSweep
 from experiments.checking.parameter_moves import Move
 
 HEAD = ("parameter", "model", "sweep", "moved", "standard errors", "found from")
@@ -55,16 +54,9 @@ def text(found: ModelCheck) -> str:
 
 
 def describe(sweep: SweepCheck) -> str:
-    """A sweep: its name, which lines of it were compared, and what the model's structure leaves in it anew."""
+    """A sweep in a line: its name, and which lines of it were compared."""
     low, high = (f"{omega / (2 * pi):.4g}" for omega in sweep.band)
-    said = f"{sweep.name}: {sweep.lines} lines from {low} to {high} Hz"
-    if sweep.more_left and isinstance(sweep.sweep, NewSweep):
-        fit = sweep.sweep.fit
-        said += (
-            f"; neighbouring residuals correlate by {fit.correlation:.2f}, as none of the model's tests did: look at "
-            f"what is new, near {fit.worst_omega / (2 * pi):.4g} Hz"
-        )
-    return said
+    return f"{sweep.name}: {sweep.lines} lines from {low} to {high} Hz"
 
 
 def tables(found: ModelCheck, sweep: SweepCheck) -> list[list[tuple[str, ...]]]:

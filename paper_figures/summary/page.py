@@ -31,8 +31,6 @@ SPACE = 0.25  # width of a space, of the letters' size
 GAP = 0.3  # widest between the columns of a table [in]
 SYNTHETIC = "#D55E00"
 SMALL = 7.0  # of the panels' keys [pt]
-SHORT = {"95 % confidence of the model": "95 % confidence"}
-"""What the panels' keys have less room for."""
 
 SYMBOLS = {
     "omega": r"$\omega$",
@@ -132,9 +130,7 @@ def _panels(
     for panel in (phase, relative):
         panel.set_xlabel(HERTZ)
     for panel in (magnitude, distance, relative):  # the phase has the lines of the magnitude
-        handles, labels = panel.get_legend_handles_labels()
-        said = [SHORT.get(label, label) for label in labels]
-        for line in panel.legend(handles, said, ncols=4, fontsize=SMALL, **panels.ABOVE).get_lines():
+        for line in panel.legend(ncols=4, fontsize=SMALL, **panels.ABOVE).get_lines():
             line.set_markersize(4)
     figure.align_ylabels()
     style.panel_letters((magnitude, phase, distance, relative))
