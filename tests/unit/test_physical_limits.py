@@ -245,7 +245,7 @@ def test_table_of_the_start_from_rest_falls_and_is_finest_where_it_falls() -> No
         (PlantModel(1.0, (), (Mode(5.0, -0.1),), 0.0, 0), CHAPTER_4, 1.0, "of real part 0.5 rad/s; expected none"),
         (integrator(1.0), CHAPTER_4, (2.0, -3.0), "limits are 2 and -3; expected the lower one first"),
         (integrator(1.0), CHAPTER_4, (0.0, 3.0), "limits are 0 and 3, between which a plant with an integ"),
-        (integrator(1.0), sinusoid(1.0, 0.0, 0.0, 1.0), 1.0, "a constant alone"),
+        (integrator(1.0), sinusoid(1.0, 0.0, np.pi / 2, 1.0), 1.0, "a constant alone"),
         (PlantModel(2.0, (), (), 0.0, 0, (), (4.0,)), sinusoid(3.0, 0.0, 1.57), 1.0, "control, of size 1.5, allow"),
         (integrator(1.0), Reference((1.0, 1.0), (2.0, 3.0), (0.0, 0.0), 0.0), 1.0, "frequencies 2, 3 rad/s"),
         (integrator(1.0), CHAPTER_4, 0.0, "the saturation limit is 0; expected a positive number"),
@@ -303,10 +303,11 @@ def test_no_run_betters_the_floor(tables: dict[str, pd.DataFrame]) -> None:
         assert (rows[f"peak_{run}"] >= rows["periodic_lower"]).all()
         assert rows[f"ratio_{run}"][0] == pytest.approx(rows[f"peak_{run}"][0] / rows["periodic_lower"][0])
         assert (rest[f"tail_{run}"] >= rest["rest_lower"] - 1e-9).all()
+        assert (rest[f"tail_{run}"] >= rest["rest_upper"] - 1e-9).all(), "its control is one that was found"
         assert (np.diff(rest[f"tail_{run}"]) <= 0).all()
         settled = rows[f"settling_{run}_s"]
         assert np.isnan(settled[0])
-        assert np.isnan(settled[1]) or settled[1] >= rows["settling_lower_s"][1]
+        assert np.isnan(settled[1]) or settled[1] >= rows["settling_upper_s"][1] >= rows["settling_lower_s"][1]
     assert rows["ratio_none"].isna().tolist() == [False, True]
 
 
