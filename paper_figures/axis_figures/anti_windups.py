@@ -28,6 +28,7 @@ FEW = 10  # times the least control is the greatest, below which powers of ten a
 ROOM = 1.25  # times the time until which a run is away that is shown
 HEADROOM = 1.15  # times the slowest recovery
 NEAR = 0.02  # of two dots, relative, that would hide each other
+TINY = 1e-300
 RING = 3.5  # wider is a dot behind another one
 OVER_LETTERS = {"bbox_to_anchor": (1.0, 1.1)}
 DOT: dict[str, Any] = {"marker": "o", "markersize": 5.0, "linestyle": "none"}
@@ -112,11 +113,12 @@ def _measures(panel: Axes, table: pd.DataFrame, words: Mapping[str, str]) -> Non
     """The dots of runs that are at one place are rings around each other."""
     shown = table[table["run"].isin(list(words)) & table["recovery_s"].notna()]
     slowest = float(shown["recovery_s"].max())
-    place = np.column_stack([np.log(shown["largest_control"]), shown["recovery_s"] / (slowest or 1.0)])
+    place = np.column_stack([np.log(shown["largest_control"].clip(lower=TINY)), shown["recovery_s"] / (slowest or 1.0)])
     for i, (_, row) in enumerate(shown.iterrows()):
         behind = int((np.abs(place[i + 1 :] - place[i]) < NEAR).all(axis=1).sum())
         look = DOT | {"fillstyle": FILLED.get(row["guarantee"], "bottom"), "color": LINES[look_of(row["run"])]["color"]}
-        panel.plot(row["largest_control"], row["recovery_s"], **(look | {"markersize": DOT["markersize"] + RING * behind}))
+        look["markersize"] += RING * behind
+        panel.plot(row["largest_control"], row["recovery_s"], **look)
     if not slowest > 0:
         _say(panel, "every run recovers at once" if slowest == 0 else "no run recovers")
     panel.set(xscale="log")
@@ -125,7 +127,11 @@ def _measures(panel: Axes, table: pd.DataFrame, words: Mapping[str, str]) -> Non
     if high < FEW * low:
         panel.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    panel.set(xlabel=r"Greatest $|u|$ / limit", ylabel="Recovery time [s]", ylim=(0, HEADROOM * slowest) if slowest > 0 else (-1, 1))
+    panel.set(
+        xlabel=r"Greatest $|u|$ / limit",
+        ylabel="Recovery time [s]",
+        ylim=(0, HEADROOM * slowest) if slowest > 0 else (-1, 1),
+    )
     if not slowest > 0:
         panel.set_yticks([0] if slowest == 0 else [])
 

@@ -88,8 +88,8 @@ def curves(
     greatest = float(np.nanmax([table[column].max() for column in errors]))
     top = 2 * min(greatest, DIVERGENT * float(table[f"{floor}_upper"].max()) or greatest)
     bottom, forced = top / 10**DECADES, float(table[f"{floor}_lower"].min())
-    if forced > 0:  # it belongs into the view
-        bottom = min(bottom, max(forced / 2, top / 10 ** (2 * DECADES)))
+    if 0 < forced < bottom:  # it belongs into the view
+        bottom = max(forced / 2, top / 10 ** (2 * DECADES))
     lower, upper = (table[f"{floor}_{end}"].clip(lower=bottom / 10**DECADES) for end in ("lower", "upper"))
     panel.fill_between(x, bottom / 10**DECADES, lower, color=GREY, linewidth=0)
     panel.plot(x, upper, **FLOOR)

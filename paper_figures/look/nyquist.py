@@ -79,8 +79,9 @@ def draw_nyquist(panel: Axes, design: Design, plant: PlantModel | None = None) -
     -----
     At some frequencies, evenly apart in the panel, stands a disc of radius |W_a C| around L: the loop of every plant
     within W_a passes through each of them, and none of them holds -1 if |W_a C S| < 1. The one that comes nearest to
-    that is drawn stronger. The circle around -1 has the radius min |1 + L| = 1/||S||. Both norms are those of the audit;
-    a loop that is not stable has none, and neither circle. Dots on the curve say where it is at a frequency in Hz. Towards a pole of L on the imaginary axis the curve leaves the panel.
+    that is drawn stronger. The circle around -1 has the radius min |1 + L| = 1/||S||. Both norms are those of the
+    audit; a loop that is not stable has none, and neither circle. Dots on the curve say where it is at a frequency in
+    Hz. Towards a pole of L on the imaginary axis the curve leaves the panel.
     """
     curves = LoopCurves.of(design)
     grid = curves.grid()
@@ -92,11 +93,11 @@ def draw_nyquist(panel: Axes, design: Design, plant: PlantModel | None = None) -
     at = omega[_spread(points, curves.radius(omega), view, STEP * side)]
     _discs(panel, curves.open(at), curves.radius(at))
     if margins:
-        nearest = margins.W_a_C_S
-        where = np.array([nearest.omega])
+        nearest = margins.W_a_C_S.omega or 0.0
+        where = np.array([nearest])
         centre, radius = curves.open(where)[0], float(curves.radius(where)[0])
         if np.isfinite(centre) and np.isfinite(radius):
-            said = rf"$\|W_a C S\|$ = {nearest.value:.4g}, at {number(nearest.omega / tau)} Hz"
+            said = rf"$\|W_a C S\|$ = {margins.W_a_C_S.value:.4g}, at {number(nearest / tau)} Hz"
             _circle(panel, centre, radius, WORST, said)
         _circle(panel, -1, modulus, MARGIN, rf"$1/\|S\|$ = {modulus:.4g}")
     _circle(panel, 0, 1, UNIT)

@@ -141,7 +141,7 @@ def test_a_peak_far_beyond_the_bandwidth_is_found_and_shown(extended_design: Des
     L = design.loop_plant(1j * omega) * C
     size = np.abs(design.additive_bound(1j * omega) * C / (1 + L))
     at = int(np.argmax(size))
-    assert abs(L[at]) < 1e-3
+    assert abs(L[at]) < 1e-2  # far below what is looked at for L
     line = line_of(plot_sensitivity(design).axes[0], "$|W_a")
     assert str(line.get_label()).endswith(f"peak {size[at]:.4g}")
     assert np.max(line.get_ydata()) == pytest.approx(size[at], rel=1e-4)
