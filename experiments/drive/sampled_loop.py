@@ -250,7 +250,7 @@ def controller_blocks(
     if form not in FORMS:
         raise InputError(f"the form is '{form}'; expected {' or '.join(FORMS)}")
     fastest = fastest_root(*design.controller_parts(), plant_block(design.loop_plant))
-    if not fastest / FAR <= drive.rate_hz <= fastest * FAR:
+    if fastest and not fastest / FAR <= drive.rate_hz <= fastest * FAR:
         raise InputError(
             f"the rate is {drive.rate_hz:g} Hz, and the loop's fastest root {fastest:.3g} rad/s; expected a rate "
             "nearer to it"
