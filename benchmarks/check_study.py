@@ -85,7 +85,7 @@ def outcomes(seed: int, k: int, counts: tuple[int, ...], scatter: float) -> list
             "moved": Outcome.MOVED in said.values(),
             "fails": any(outcome.fails for outcome in said.values()),
         }
-        found.append({"moved": true is not plant, "tests": count, "lines": lines, "noise": noise} | told)
+        found.append({"mode moved": true is not plant, "tests": count, "lines": lines, "noise": noise} | told)
     return found
 
 
@@ -100,7 +100,7 @@ def main(models: int, seed: int, tests: tuple[int, ...], scatter: float) -> None
     table = pd.DataFrame([row for k in runs for row in outcomes(seed, k, tests, scatter)])
     table["noise"] = pd.cut(table["noise"], [0.003, 0.01, 0.03, 0.1])
     told = ["leaves W_a", "parameters moved", "moved", "fails"]
-    for by in (["moved"], ["moved", "tests"], ["moved", "lines"], ["moved", "noise"]):
+    for by in (["mode moved"], *(["mode moved", each] for each in ("tests", "lines", "noise"))):
         groups = table.groupby(by, observed=True)[told]
         click.echo(groups.mean().assign(sweeps=groups.size()).round(4).to_string() + "\n")
 

@@ -102,8 +102,11 @@ def _bound(found: ModelCheck, looked: Sequence[Reach], beyond_fit: Reach, parame
         )
     record = found.model.fit
     if worst.chance >= share:
-        return Outcome.HOLDS, f"the sweep leaves W_a by no more than its noise explains: {_apart(found, worst)}"
-    left = f"the sweep leaves W_a at {where}, by more than its noise explains: {_apart(found, worst)}"
+        return (
+            Outcome.HOLDS,
+            f"the sweep leaves W_a at {where} by no more than its noise explains: {_apart(found, worst)}",
+        )
+    left = f"the sweep leaves W_a at {where} by more than its noise explains: {_apart(found, worst)}"
     if record is None:
         return (
             Outcome.OUTSIDE,
@@ -126,7 +129,7 @@ def _bound(found: ModelCheck, looked: Sequence[Reach], beyond_fit: Reach, parame
 def _apart(found: ModelCheck, worst: Reach) -> str:
     unit = f" {found.model.signals.gain_unit}".rstrip()
     distance, bound = _told(worst.distance, worst.bound, lambda value, digits: f"{value:.{digits}g}{unit}")
-    return f"at {_hertz(worst.omega)} it is {distance} from the model, and W_a is {bound}"
+    return f"it is {distance} from the model there, and W_a is {bound}"
 
 
 def _hertz(omega: float) -> str:
@@ -183,7 +186,7 @@ def _by(move: Move) -> str:
         return "to the other sign"
     how = f"by {relative(move.share)}" if move.parameter.value else f"from 0 to {1e3 * move.value:.3g} ms"
     errors = abs(move.errors)
-    return f"{how} ({errors:.{3 if errors < 1000 else 4}g} standard errors)"
+    return f"{how} ({f'{errors:.3g}' if errors < 1000 else f'{errors:.0f}'} standard errors)"
 
 
 def relative(share: float) -> str:
@@ -211,7 +214,7 @@ def _margins(promised: Promise, on_plant: OnPlant, is_within: bool) -> tuple[Out
     said = f"its modulus margin is {new}, {'as with the model' if new == old else f'and {old} with the model'}"
     robust = f"as |W_a C S| reaches {before.W_a_C_S.value:.3g}, the design promises no plant within W_a a margin"
     if promised.modulus:
-        robust = f"the design promises {promised.modulus:.3g} {to_whom}"
+        robust = f"the design promises at least {promised.modulus:.3g} {to_whom}"
     return Outcome.HOLDS, f"the loop is stable, and {said}; {robust}"
 
 
@@ -224,7 +227,7 @@ def _guarantee(promised: Promise, on_plant: OnPlant) -> tuple[Outcome, str]:
     if on_plant.sector < (1 - ROUNDING) * promised.sector:
         lost = f"the circle criterion gives the sector {found}, less than the {asked} that is promised"
         if promised.sector >= 1:
-            lost = f"it is NOT guaranteed that windup ends whatever the control: the circle criterion gives {found}"
+            lost = f"it is NOT guaranteed that windup ends whatever the control: {lost}"
         return Outcome.LOST, f"with the new plant {lost}"
     if promised.sector >= 1:
         return Outcome.HOLDS, "windup ends whatever the control with the new plant too (found on a grid, not proved)"

@@ -50,9 +50,9 @@ class Move:
 
     @property
     def share(self) -> float:
-        """By what share of the model's value it moved; infinite from 0."""
+        """By what share of the model's value it moved, above 0 where its magnitude grew; infinite from 0."""
         before = self.parameter.value
-        return (self.value - before) / abs(before) if before else float(np.inf) * (self.value > 0)
+        return self.value / before - 1 if before else float(np.inf) * (self.value > 0)
 
 
 def tests_differ(record: FitRecord) -> bool:

@@ -17,9 +17,11 @@ def first_sentence(found: ModelCheck) -> str:
     """What to do and why, in one sentence without its full stop."""
     given = answers(found)
     failed: dict[str, str] = {}  # of each question that of the first sweep, rather one that moved
-    for each in sorted(given, key=lambda each: each.outcome is Outcome.OUTSIDE):
-        if each.outcome.fails:
-            failed.setdefault(each.question, each.sentence + (f" ({each.sweep})" if len(found.sweeps) > 1 else ""))
+    for question in dict.fromkeys(each.question for each in given):
+        failing = [each for each in given if each.question == question and each.outcome.fails]
+        if failing:
+            each = min(failing, key=lambda each: each.outcome is Outcome.OUTSIDE)
+            failed[question] = each.sentence + (f" ({each.sweep})" if len(found.sweeps) > 1 else "")
     held = {each.question for each in given if each.outcome is Outcome.HOLDS} - failed.keys()
     if not failed:
         reasons = ["every sweep lies within W_a" if len(found.sweeps) > 1 else "the sweep lies within W_a"]

@@ -174,7 +174,7 @@ def test_a_sweep_outside_the_bound_has_moved_only_if_the_tests_scatter_less(
     assert sentence.endswith("nothing shows that the plant moved") == (outcome is Outcome.OUTSIDE)
     todo = "Fit a new model to the old tests and the new sweep together: the sweep leaves W_a at "
     assert first_sentence(found).startswith(todo) == (outcome is Outcome.OUTSIDE)
-    assert ("moved by" in first_sentence(found)) == (outcome is not Outcome.OUTSIDE)
+    assert ("the gain moved by +30 %" in first_sentence(found)) == (outcome is Outcome.MOVED)
 
 
 def test_the_scatter_of_the_tests_does_not_explain_a_single_line(scattering: IdentifiedModel) -> None:
