@@ -30,7 +30,7 @@ STEPS = (
     *((0, -2, 0, -2), (0, -1, 0, -1), (0, -2, 0, 0), (0, 0, 0, -2), (0, -1, 0, 0), (0, 0, 0, -1)),
     *((0, 0, -1, 0), (0, 0, -2, 0), *ALL_PASSES),
     *((-1, -1, 0, 0), (1, 0, 0, -1), (-1, 0, 0, 1), (1, 1, 0, 0), (-2, -2, 0, 0), (2, 0, 0, -2)),
-    *((0, 0, 0, 1), (0, 1, 0, 0), (0, 1, 0, 1)),
+    *((0, 0, 0, 1), (0, 1, 0, 0), (0, 1, 0, 1), (0, 0, 1, 0)),
 )
 """Integrators, left zeros, right zeros and poles that a step adds: fewer roots, s = 0 for a slow root, more roots."""
 FLIPS = ((0, -1, 1, 0), (0, -2, 2, 0), (0, 1, -1, 0), (0, 2, -2, 0))
@@ -67,7 +67,12 @@ def reached_from(fit: Likely, target: Structure, omega: Real) -> list[Real]:
     elif changes[1] < 0 < changes[0]:
         found = [(left, right, sides[2]) for right, left in _mirrored(sides[1], sides[0], changes[0])]
     else:
-        lefts, rights, poles = (_changed(side, change, omega) for side, change in zip(sides, changes, strict=True))
+        places = np.log([omega[0] / BAND, np.sqrt(omega[0] * omega[-1]), omega[-1] * BAND])
+        by_delay = np.log([1 / fit.theta[-1], 2 / fit.theta[-1]]) if fit.theta[-1] > 0 else places[:0]
+        lefts, rights, poles = (
+            _changed(side, change, where)
+            for side, change, where in zip(sides, changes, (places, [*places, *by_delay], places), strict=True)
+        )
         found = list(product(lefts, rights, poles))
     starts = []
     for there in found:
@@ -116,7 +121,7 @@ def _mirrored(source: Side, goal: Side, count: int) -> Iterator[tuple[Side, Side
                 yield kept, _with_root(*goal, log_omega + shift)
 
 
-def _changed(side: Side, change: int, omega: Real) -> list[Side]:
+def _changed(side: Side, change: int, places: Sequence[float]) -> list[Side]:
     """The polynomials with ``change`` roots more that are worth a try."""
     modes, rates = side
     if change == 0:
@@ -124,7 +129,6 @@ def _changed(side: Side, change: int, omega: Real) -> list[Side]:
     if change == -2:
         return [(np.delete(modes, i, axis=0), rates) for i in range(len(modes))]
     if change == 1:
-        places = np.log([omega[0] / BAND, np.sqrt(omega[0] * omega[-1]), omega[-1] * BAND])
         return [_with_root(modes, rates, place) for place in places]
     found: list[Side] = [(modes, rates[:0])] if rates.size else []
     for i, (log_omega, log_zeta) in enumerate(modes):
