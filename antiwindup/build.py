@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -24,7 +24,7 @@ from identification.base.folder_lock import locked_folder
 REFUSED, USAGE = "Error: ", "Usage: "
 
 Tell = Callable[[int, Sequence[str]], object]
-"""Called with the number of steps that have ended and the names of those that run."""
+"""Called before each wait, with the number of steps that have ended and the names of those that run."""
 
 
 class Crash(Exception):
@@ -115,8 +115,7 @@ class Build:
                 self._folder.require_free(places)
             self._folder.remove({self.path / name for name in self._folder.written} - {*places})
             try:
-                for ended, _ in enumerate(self._ended()):
-                    tell(ended + 1, [running.step.name for running in self._running.values()])
+                self._run(tell)
                 for step in self.steps:
                     if step not in self.needed and not self._folder.holds(self._source(step), step.outputs):
                         self._remove([step])
@@ -127,8 +126,8 @@ class Build:
                     running.closing.close()
                 self._folder.save()
 
-    def _ended(self) -> Iterator[tuple[Step, int]]:
-        """The steps as they end, with the number of the stage."""
+    def _run(self, tell: Tell) -> None:
+        """Run the steps, each after those that make what it reads."""
         steps = self.needed
         makers = {output: step for step in steps for output in (*step.outputs, step.refusal)}
         sorter = TopologicalSorter[tuple[Step, int]]()  # a run is a step and the number of its stage
@@ -139,7 +138,7 @@ class Build:
                 sorter.add((step, stage), *runs_before, *([(step, stage - 1)] if stage else []))
         sorter.prepare()
         self._untouched = {*steps}
-        waiting: list[tuple[Step, int]] = []
+        done, waiting = 0, list[tuple[Step, int]]()
         while sorter.is_active():
             waiting = sorted([*waiting, *sorter.get_ready()], key=lambda run: (_is_last(*run), steps.index(run[0])))
             ended = []
@@ -147,10 +146,11 @@ class Build:
                 if self._settled(*(run := waiting.pop(0))):
                     ended.append(run)
             if not ended:
+                tell(done, [running.step.name for running in self._running.values()])
                 ended = [self._settle(self._running.pop(number)) for number in wait(list(self._running))]  # type: ignore[arg-type]
             for run in ended:
                 sorter.done(run)
-                yield run
+                done += 1
 
     def _settled(self, step: Step, stage: int) -> bool:
         """Whether nothing is to be done for a step in a stage; if something is, it is started."""

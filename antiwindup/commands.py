@@ -173,9 +173,7 @@ def _build(asked: Asked, steps: Sequence[Step], wanted: Sequence[Step], goes_on:
     with tqdm(bar_format="{desc}", disable=None, leave=False) as bar:
 
         def tell(ended: int, running: Sequence[str]) -> None:
-            bar.set_description_str(f"step {min(ended + 1, build.runs)} of {build.runs}: {', '.join(running)}")
-
-        tell(0, [step.name for step in build.needed[:1]])
+            bar.set_description_str(f"step {ended + 1} of {build.runs}: {', '.join(running)}")
 
         try:
             build.run(tell)

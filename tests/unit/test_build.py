@@ -100,8 +100,9 @@ def refit(
         wanted = [step for step in steps if step.name in only] or (steps if goal == "report" else first)
         build = Build(asked.folder, steps, inputs or asked.sweep_files, wanted, goal == "refit", 4, force)
         told: list[int] = []
-        build.run(lambda ended, running: told.append(ended))
-        assert told == list(range(1, build.runs + 1))
+        build.run(lambda ended, running: told.append(ended if running else -1))
+        assert told == sorted({*told})
+        assert not told or 0 <= told[0] <= told[-1] < build.runs
         return build
 
     return run
