@@ -97,7 +97,7 @@ def test_roots_far_outside_the_band_are_left_out() -> None:
 
 
 def test_a_dead_time_is_given_up_for_a_zero_on_the_right() -> None:
-    """SYNTHETIC: two real poles and a long dead time miss the plant; the step to a zero at 40 rad/s leaves its noise."""
+    """SYNTHETIC: two real poles and a dead time miss the plant; the step to a zero at 40 rad/s leaves noise."""
     omega = np.geomspace(0.6, 600.0, 60)
     exact = 2 * (1 - 1j * omega / 40) / ((1 + 1j * omega / 5) * (1 + 1j * omega / 100)) * np.exp(-0.002j * omega)
     noise = np.random.default_rng(3).standard_normal((60, 2)) @ [1, 1j] / np.sqrt(2)
