@@ -94,7 +94,7 @@ class Case:
         random = self.random(3)
         if self.kind == "delay-free":
             share = 10 ** random.uniform(-3, -0.5)
-            return {"period_s": 2 * math.pi / self.slow, "epsilon": float((share * self.slow) ** 2)}
+            return {"reference_omegas": (float(self.slow),), "epsilon": float((share * self.slow) ** 2)}
         count = int(random.choice(8, p=[0.1, 0.35, 0.2, 0.1, 0.1, 0.05, 0.05, 0.05]))
         harmonics = np.sort(random.choice(np.arange(1, 12), count, replace=False))
         spread = 0.0 if random.random() < 0.5 else random.uniform(-0.3, 0.3, count)  # commensurate, or not

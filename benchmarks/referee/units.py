@@ -53,13 +53,13 @@ class Scaled(Case):
     def options(self) -> dict[str, Any]:
         """The options of the case in these units."""
         time, options = self.units[0], dict(case_of(self.seed, self.index).options)
-        powers = {"period_s": 1, "epsilon": -2, "a": -1, "inverse_epsilon": 1}
+        powers = {"epsilon": -2, "a": -1, "inverse_epsilon": 1}
         for name, power in powers.items():
             if name in options:
                 options[name] *= time**power  # type: ignore[operator]
         if "pairs" in options:
             options["pairs"] = [(e / time, f / time**2) for e, f in options["pairs"]]  # type: ignore[attr-defined]
-            options["reference_omegas"] = [w / time for w in options["reference_omegas"]]  # type: ignore[attr-defined]
+        options["reference_omegas"] = [w / time for w in options["reference_omegas"]]  # type: ignore[attr-defined]
         return options
 
 
