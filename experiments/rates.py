@@ -23,6 +23,7 @@ from identification.base.errors import InputError
 NAMES = ("none", "corrected")
 SAMPLES = (2, 4, 8, 16, 32, 64)  # in a period of the fastest root of the controller
 AN_OCTAVE = 2  # rates, below these
+FOLLOWED = 0.1  # of the amplitude: a loop whose error in continuous time is more does not follow
 ROWS = 1000  # a period, of the run in continuous time
 
 Tick = Callable[[], object]
@@ -95,7 +96,7 @@ def rates_tables(
     judged = {drive: _linear(design, drive, reference) for drive in drives}
     rows = [row | {"stable": 1} for row in rows]
     for name, continuous in zip(names, rows[:], strict=True):
-        follows = continuous["steady_error"] <= SETTLED * reference.amplitude and name in NAMES
+        follows = continuous["steady_error"] <= FOLLOWED * reference.amplitude and name in NAMES
         tried = [each for each in judged if name in NAMES or each.rate_hz == rate]
         ran = [each for each in tried if (follows and math.isfinite(judged[each])) or each.rate_hz == rate]
         found = dict(zip(ran, rows_of(design, reference, name, ran, time_s[-1], period, tick=tick), strict=True))

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from design.design_file import Design
+from experiments.drive.difference_equations import split
 from experiments.drive.held_plant import held_plant
 from experiments.drive.judge_loop import PAST, response
 from experiments.drive.sampled_loop import FORMS, Drive, controller_blocks
 
-PLACES = 8  # in a sample
+PLACES = 8  # in a sample, beside the one at which the held input arrives
 
 
 def error_between(design: Design, drive: Drive, amplitudes: Sequence[float], omegas: Sequence[float]) -> float:
-    """The most that the error of a linear loop reaches in the steady state, at PLACES of each sample.
+    """The most that the error of a linear loop reaches in the steady state, at PLACES and at the kink of each sample.
 
     Parameters
     ----------
@@ -38,10 +38,11 @@ def error_between(design: Design, drive: Drive, amplitudes: Sequence[float], ome
     if not len(theta):
         return 0.0
     z, w = np.exp(1j * theta), np.expm1(1j * theta) / T
-    outputs = []
-    for share in np.arange(PLACES) / PLACES:
+    _, rest = split(design.loop_plant.delay_s + drive.input_delay_s, T)
+    shares, outputs = [*np.arange(PLACES) / PLACES, 1 - rest], []
+    for share in shares:
         P_d, samples = held_plant(design.loop_plant, T, drive.input_delay_s + float(share) * T)
         outputs.append(P_d(w) * z**-samples)
     control = response(forward, z) / (1 - response(feedback, z) + response(forward, z) * outputs[0])
-    errors = [abs(z ** (-k / PLACES) - output * control) @ sizes for k, output in enumerate(outputs)]
-    return max(map(float, errors), default=math.nan)
+    errors = [abs(z**-share - output * control) @ sizes for share, output in zip(shares, outputs, strict=True)]
+    return max(map(float, errors))

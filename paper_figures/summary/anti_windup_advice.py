@@ -66,7 +66,11 @@ def use_not(design: Design, found: Found, signals: Signals) -> Iterator[str]:
     times = recoveries(found)
     others = [run for run in times if run != "none" and not (run == "corrected" and said)]
     for place, upset in enumerate(("from rest", "after the disturbance of the comparison")):
-        gone = [f"'{run}'" for run in others if _fails_first(times[run]) == place]
+        gone = [
+            "that of Eq. (2.23)" if run == "thesis" else f"'{run}'"
+            for run in others
+            if _fails_first(times[run]) == place
+        ]
         if gone and not math.isnan(times[str(best)][place]):
             yield f"Do not use {_listed(gone)}, with which the loop does not recover {upset}."
     yield from _without(str(best), found, signals)

@@ -70,9 +70,8 @@ def avoid(rates: pd.DataFrame, run: str | None, signals: Signals) -> Iterator[st
             left = f"the steady error is {_left(last, signals)}" if last["stable"] else "the loop is unstable"
             until = f"at any rate up to {hertz(last['rate_hz'])}" if math.isnan(lowest) else f"below {hertz(lowest)}"
             yield f"Do not use {words} {until}: at {hertz(last['rate_hz'])} {left}."
-    least = continuous_error(rates, run)
     for _, row in _at(rates, run, only(rates, "asked_hz")).iterrows():
-        if not row["stable"] or is_near(row, least):
+        if not row["stable"] or is_near(row, continuous_error(rates, run)):
             continue
         words, unslewed = METHODS[str(row["method"])], float(row["unslewed_error"])
         at = f"Do not run it by {words} at your rate of {hertz(row['rate_hz'])}"

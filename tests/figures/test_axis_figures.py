@@ -130,7 +130,8 @@ def test_the_rates_are_those_of_the_table_and_the_caption_says_from_where_on(des
     table = tables["rates"]
     rows = table[(table["run"] == "corrected") & (table["method"] == "exact")]
     assert any(
-        np.array_equal(line.get_xdata(), rows["rate_hz"]) and np.allclose(line.get_ydata(), rows["steady_error"], equal_nan=True)
+        np.array_equal(line.get_xdata(), rows["rate_hz"])
+        and np.allclose(line.get_ydata(), rows["steady_error"], equal_nan=True)
         for line in panel.lines
     )
     assert 30.0 in set(rows["rate_hz"])
