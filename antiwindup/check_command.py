@@ -31,13 +31,13 @@ def check(
 ) -> None:
     """See whether new SWEEP files still lie within W_a of MODEL, and which parameters moved.
 
-    MODEL is a model.json, or table or implied. The exit status is 0 if all holds, 1 if something moved, 2 if the input
-    was refused.
+    MODEL is a model.json, or table or implied. The exit status is 0 if all holds, 1 if a sweep leaves W_a, a parameter
+    moved or the design lost what it promises, 2 if the input was refused.
     """
     from design.asked_model import asked_model
     from design.design_file import read_design
     from experiments.checking import files
-    from experiments.checking.answers import answers, has_moved
+    from experiments.checking.answers import answers, fails
     from experiments.checking.check_model import check_model
     from experiments.checking.words import text
     from identification.base.files import require_writable, write_whole
@@ -57,5 +57,5 @@ def check(
 
     write_whole({path: writer(made(found)) for path, made in targets.items()}, inputs)
     click.echo(said)
-    if has_moved(answers(found)):
+    if fails(answers(found)):
         click.get_current_context().exit(1)

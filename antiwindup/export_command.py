@@ -74,7 +74,8 @@ def export(
     if not judge_loop(content, drive).stable:
         raise InputError(judgement)
     controller = sampled_controller(content, anti_windup, drive.limits, rate, drive.method, name)
-    given, plant = (controller, check_run(content, controller)), content.loop_plant
+    run, plant = check_run(content, controller), content.loop_plant
+    given = (controller, run)
     writers: dict[str, Callable[[], Mapping[str, str | bytes]]] = {
         "c": lambda: c_code.files(*given, precision),
         "matlab": lambda: matlab.files(*given, plant),
@@ -85,7 +86,8 @@ def export(
     }
     files = writers[to]()
     write_whole({output / file: partial(_write, content=written) for file, written in files.items()}, [design])
-    click.echo(f"{judgement}. {controller.promise}; {', '.join(files)} -> {output}")
+    tested = "" if run.saturates else "; the run of its test does not saturate"
+    click.echo(f"{judgement}. {controller.promise}{tested}; {', '.join(files)} -> {output}")
 
 
 def _write(path: Path, content: str | bytes) -> None:

@@ -17,7 +17,7 @@ import click
 
 from experiments.axis_command import axis_command
 from experiments.campaign.command import campaign_command
-from experiments.options import DESIGN, OUTPUT_FOLDER, asked_limits, sinusoid_options
+from experiments.options import DESIGN, OUTPUT_FOLDER, RATE_LIMIT, asked_limits, sinusoid_options
 from experiments.pair_options import NumberPair, PairCommand
 from experiments.run_commands import sampled_command, simulate_command
 from experiments.table_commands import rates_command, tracking_command
@@ -76,9 +76,12 @@ def campaign_distributions(campaign: Path, output: Path) -> None:
     required=True,
     help="Saturation limits in the actuator's unit, LOW < HIGH, or one number for +- that; repeatable.",
 )
+@RATE_LIMIT
 @sinusoid_options
 @OUTPUT_FOLDER
-def limits(design: Path, limits: tuple[tuple[float, ...], ...], output: Path, **reference: Any) -> None:
+def limits(
+    design: Path, limits: tuple[tuple[float, ...], ...], rate_limit: float, output: Path, **reference: Any
+) -> None:
     """What no controller of DESIGN's plant can better: limits_KIND.csv, limits_KIND_summary.csv (the first LIMIT)."""
     from tqdm import tqdm
 
@@ -89,7 +92,8 @@ def limits(design: Path, limits: tuple[tuple[float, ...], ...], output: Path, **
     content = read_design(design)
     with tqdm(desc="limits", unit="", disable=None, leave=False) as bar:
         asked = sinusoids(content, **reference)
-        write_into(output, limits_tables(content, asked, limits, bar.update, ("none", "corrected")))
+        names = ("none", "corrected")
+        write_into(output, limits_tables(content, asked, limits, bar.update, names, rate_limit))
 
 
 @main.command("compare", cls=PairCommand)
@@ -101,9 +105,10 @@ def limits(design: Path, limits: tuple[tuple[float, ...], ...], output: Path, **
     metavar="[LOW] HIGH",
     help="Saturation limits in the actuator's unit; +- 1.2 times what the reference needs unless given.",
 )
+@RATE_LIMIT
 @sinusoid_options
 @OUTPUT_FOLDER
-def compare(design: Path, limit: tuple[float, ...] | None, output: Path, **reference: Any) -> None:
+def compare(design: Path, limit: tuple[float, ...] | None, rate_limit: float, output: Path, **reference: Any) -> None:
     """The anti-windups of DESIGN beside those of others: compare.csv, compare_runs.csv."""
     from tqdm import tqdm
 
@@ -115,7 +120,7 @@ def compare(design: Path, limit: tuple[float, ...] | None, output: Path, **refer
     limits = None if limit is None else asked_limits(limit)
     with tqdm(desc="compare", unit="", disable=None, leave=False) as bar:
         asked = sinusoids(content, **reference)
-        write_into(output, comparison_tables(content, asked, limits, bar.update))
+        write_into(output, comparison_tables(content, asked, limits, bar.update, rate_limit=rate_limit))
 
 
 if __name__ == "__main__":

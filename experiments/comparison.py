@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pandas as pd
@@ -11,13 +12,14 @@ from design.anti_windup.compensator import AntiWindup, uncertainty_cost
 from design.anti_windup.other_anti_windups import OTHERS
 from design.blocks.block import plant_block
 from design.design_file import Design
+from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import Run, limit_pair, simulate
 from experiments.physical_limits.least_peak_error import RestLimit
-from experiments.runs.compare_anti_windups import SETTLED, run_all, span
+from experiments.runs.compare_anti_windups import SETTLED, anti_windups, is_slewing, run_all, span
 from experiments.runs.design_loop import design_loop
 from experiments.runs.disturbances import Disturbances, steps
 from experiments.runs.guarantee import guarantee, sector_text
-from experiments.runs.metrics import settling_time
+from experiments.runs.metrics import of_table, recovery, settling_time
 from experiments.runs.references import Reference
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
@@ -29,6 +31,7 @@ PULSE = 0.1  # of a period: how long the disturbance acts
 SAMPLES = 2000  # a period
 KEPT = 8  # of the samples every so many are written
 STEPS = 100  # of a period, of the physical limit
+SMALLER = (2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times, the reference where no run recovers
 
 Tick = Callable[[], object]
 
@@ -39,6 +42,7 @@ def comparison_tables(
     limits: float | tuple[float, float] | None = None,
     tick: Tick = lambda: None,
     plant: PlantModel | None = None,
+    rate_limit: float = math.inf,
 ) -> dict[str, pd.DataFrame]:
     """Run a design without and with each anti-windup that there is for it, from rest and through a disturbance.
 
@@ -55,6 +59,8 @@ def comparison_tables(
         Called after every run.
     plant
         The true plant; the design's own model unless given.
+    rate_limit
+        The most that the actuator changes in a second, in its unit; the controller does not know it.
 
     Returns
     -------
@@ -66,7 +72,8 @@ def comparison_tables(
         run, upset, refused
             The last is the sentence where the design has no such anti-windup; the cells after it are empty then.
         guarantee, f
-            ``global``: whatever the control; ``sector K``; ``none``. ||W_a (1 + theta1~)||, (2.19); empty where
+            ``global``: whatever the control; ``sector K``; ``none``, also where the actuator was too slow for the
+            control, since guarantees are of limits alone. ||W_a (1 + theta1~)||, (2.19); empty where
             the anti-windup is not of this form.
         recovery_s
             When |y - y0| has fallen to 1 % of the reference's amplitude for good, y0 being the output without
@@ -78,9 +85,13 @@ def comparison_tables(
             betters; the last for the start only, and for a periodic reference.
         largest_control, last_error
             The greatest |u| over the larger limit, and the greatest |r - y| of the last period.
-        lower_limit, limit, amplitude, required
-            The second is the upper limit, the third the sum of the reference's amplitudes, the last the most that the
+        lower_limit, limit, rate_limit, amplitude, required
+            The second is the upper limit, then come the sum of the reference's amplitudes and the most that the
             control of perfect tracking reaches.
+        enough
+            1 where a run recovers from rest; else how many times smaller the reference was when one did, the first
+            power of two of those up to 64; empty: with none of them. Limits and rate limit so many times wider do the
+            same.
 
         ``compare_runs``: time_s, reference, output_unsaturated, and for every run NAME output_NAME and control_NAME.
 
@@ -109,18 +120,23 @@ def comparison_tables(
     runs: dict[str, Run] = {}
     for name, loop in loops.items():
         try:
-            runs |= run_all({name: loop}, pair, time_s)
+            runs |= run_all({name: loop}, pair, time_s, rate_limit)
         except InputError as error:
             refused[name] = str(error)
         tick()
     band = SETTLED * reference.amplitude
+    first = time_s <= begin
+    enough = _enough(runs, loops, pair, rate_limit, time_s[first], unsaturated[first], band, period)
     from_s, least = _least_error(true, reference, pair, period)
     rows = []
     for name in ("none", *design.anti_windup, *OTHERS):
         known: dict[str, object] = {"lower_limit": low, "limit": high, "required": required}
         known |= {"amplitude": reference.amplitude, "refused": refused.get(name)}
+        known |= {"rate_limit": of_table(rate_limit), "enough": enough}
         if name in kinds:
             known |= _promised(design, kinds[name], true)
+        if name in runs and is_slewing(runs[name]):
+            known |= {"guarantee": "none"}
         for upset, start_s in (("start", 0.0), ("pulse", begin)):
             row: dict[str, object] = {"run": name, "upset": upset} | known
             if name in runs:
@@ -131,18 +147,6 @@ def comparison_tables(
     for name, run in runs.items():
         series |= {f"output_{name}": run.outputs["output"], f"control_{name}": run.control}
     return {"compare": pd.DataFrame(rows), "compare_runs": pd.DataFrame(series).iloc[::KEPT]}
-
-
-def anti_windups(design: Design) -> tuple[dict[str, AntiWindup | None], dict[str, str]]:
-    """No anti-windup, those that a design holds and those of others, by name; and why some of these do not exist."""
-    found: dict[str, AntiWindup | None] = {"none": None}
-    refused = {}
-    for name in (*design.anti_windup, *OTHERS):
-        try:
-            found[name] = design.chosen(name)
-        except InputError as error:
-            refused[name] = str(error)
-    return found, refused
 
 
 def _period(design: Design, reference: Reference) -> float:
@@ -171,6 +175,36 @@ def _least_error(
         return rest.start_s(index), rest.at(index).lower
     except InputError:
         return period / 4, np.nan
+
+
+def _enough(
+    runs: Mapping[str, Run],
+    loops: Mapping[str, SaturatedLoop],
+    limits: tuple[float, float],
+    rate_limit: float,
+    time_s: np.ndarray,
+    unsaturated: np.ndarray,
+    band: float,
+    period: float,
+) -> float:
+    """How many times smaller the reference must be, from rest, for one of the runs to recover."""
+
+    def recovers(run: Run) -> bool:
+        distance = run.outputs["output"][: len(time_s)] - unsaturated
+        return not math.isnan(recovery(time_s, distance, band, period))
+
+    if any(recovers(run) for run in runs.values()):
+        return 1.0
+    for multiple in SMALLER:  # the loop is homogeneous: wider limits under the same reference
+        wider = multiple * limits[0], multiple * limits[1]
+        for name in runs:
+            try:
+                (run,) = run_all({name: loops[name]}, wider, time_s, multiple * rate_limit).values()
+            except InputError:
+                continue
+            if recovers(run):
+                return multiple
+    return math.nan
 
 
 def _row(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import click
 
 from experiments.pair_options import NumberPair
@@ -49,6 +51,12 @@ LIMIT_PAIR = click.option(
     help="Saturation limits in the actuator's unit, LOW < HIGH, or one number for +- that; inf for none.",
 )
 
+RATE_LIMIT = click.option(
+    "--rate-limit",
+    type=float,
+    default=math.inf,
+    help="Most change of the actuator in a second, in its unit, unknown to the controller.",
+)
 
 disturbance_options = together(
     click.option(

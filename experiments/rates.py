@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from design.blocks.block import fastest_root
 from design.design_file import Design
+from experiments.drive.between_samples import error_between
 from experiments.drive.judge_loop import judge_loop
 from experiments.drive.sampled_loop import METHODS, Drive, simulate_sampled
-from experiments.runs.compare_anti_windups import SETTLED, loops, run_all, span, usual_periods
-from experiments.runs.metrics import over_last, settling_time
+from experiments.runs.compare_anti_windups import SETTLED, anti_windups, loops, run_all, span, usual_periods
+from experiments.runs.metrics import of_table, over_last, settling_time
 from experiments.runs.references import Reference
 from identification.base.errors import InputError
 
 NAMES = ("none", "corrected")
 SAMPLES = (2, 4, 8, 16, 32, 64)  # in a period of the fastest root of the controller
+AN_OCTAVE = 2  # rates, below these
+FOLLOWED = 0.1  # of the amplitude: a loop whose error in continuous time is more does not follow
 ROWS = 1000  # a period, of the run in continuous time
 
 Tick = Callable[[], object]
@@ -27,6 +32,13 @@ Tick = Callable[[], object]
 def usual_rates(design: Design) -> dict[int, float]:
     """SAMPLES in a period of the fastest zero or pole of the controller -> the rate in Hz."""
     return {n: n * fastest_root(*design.controller_parts()) / math.tau for n in SAMPLES}
+
+
+def lower_rates(design: Design, reference: Reference) -> list[float]:
+    """From two samples in a period of the reference's fastest sinusoid up to the :func:`usual_rates`, in Hz."""
+    low = 2 * (max(reference.frequencies) / math.tau or 1 / span(design, reference))
+    octaves = math.log2(min(usual_rates(design).values()) / low)
+    return [low * 2 ** (k / AN_OCTAVE) for k in range(1, math.ceil(AN_OCTAVE * octaves))]
 
 
 def rates_tables(
@@ -51,7 +63,7 @@ def rates_tables(
     limits
         (lower, upper), in the actuator's unit.
     rate
-        Of the computer in Hz, beside :func:`usual_rates`.
+        Of the computer in Hz, beside :func:`usual_rates` and :func:`lower_rates`.
     quantum, rate_limit, input_delay_s
         Of the actuator, see :class:`experiments.drive.sampled_loop.Drive`; the run in continuous time has the rate
         limit only.
@@ -61,28 +73,56 @@ def rates_tables(
     Returns
     -------
     dict
-        ``rates``, see :func:`rows_of`, with stable (1 or 0: whether the linear loop is, see
-        :func:`experiments.drive.judge_loop.judge_loop`), and in every row asked_hz (empty: none), amplitude (of the
-        reference), quantum, lower_limit and limit (the upper one).
+        ``rates``, see :func:`rows_of`, of NAMES and, at ``rate`` alone, of every anti-windup that there is. A run is
+        made where its linear loop is stable (stable 1, else 0, see :func:`experiments.drive.judge_loop.judge_loop`) and
+        follows in continuous time, and at ``rate``; steady_error, empty of what is not run, is no less than that of the
+        linear loop between the samples, see :func:`experiments.drive.between_samples.error_between`. unslewed_error is
+        that of the run without the rate limit, at ``rate``. In every row: asked_hz (empty: none), amplitude (of the
+        reference), quantum, lower_limit, limit (the upper one), and rate_limit (empty: none).
     """
     period, low_high = span(design, reference), dict(zip(("lower_limit", "limit"), limits, strict=True))
     count = usual_periods(design, reference)
     time_s = np.linspace(0.0, count * period, count * ROWS + 1)
-    rates = sorted({*usual_rates(design).values(), *([rate] if rate else [])})
-    rows = []
-    for name, run in run_all(loops(design, reference, NAMES), limits, time_s, rate_limit).items():
+    rates = sorted({*usual_rates(design).values(), *lower_rates(design, reference), *([rate] if rate else [])})
+    rows: list[dict[str, Any]] = []
+    names = [*NAMES, *sorted({*anti_windups(design)[0]} - {*NAMES} if rate else ())]
+    for name, run in run_all(loops(design, reference, names), limits, time_s, rate_limit).items():
         rows.append(
             {"run": name, "method": "continuous", "rate_hz": math.nan}
             | numbers_of(time_s, run.outputs["error"], period, reference)
         )
         tick()
     drives = [Drive(each, method, limits, quantum, rate_limit, input_delay_s) for method in METHODS for each in rates]
-    for name in NAMES:
-        rows += rows_of(design, reference, name, drives, time_s[-1], period, tick=tick)
-    judged = [judge_loop(design, drive, omegas=reference.frequencies).stable for drive in drives]
-    stable = [1] * len(NAMES) + [int(each) for each in judged] * len(NAMES)
+    judged = {drive: _linear(design, drive, reference) for drive in drives}
+    rows = [row | {"stable": 1} for row in rows]
+    for name, continuous in zip(names, rows[:], strict=True):
+        follows = continuous["steady_error"] <= FOLLOWED * reference.amplitude and name in NAMES
+        tried = [each for each in judged if name in NAMES or each.rate_hz == rate]
+        ran = [each for each in tried if (follows and math.isfinite(judged[each])) or each.rate_hz == rate]
+        found = dict(zip(ran, rows_of(design, reference, name, ran, time_s[-1], period, tick=tick), strict=True))
+        free = [replace(each, rate_limit=math.inf) for each in ran if each.rate_hz == rate and rate_limit < math.inf]
+        unslewed = rows_of(design, reference, name, free, time_s[-1], period, tick=tick)
+        errors = {(row["method"], row["rate_hz"]): row["steady_error"] for row in unslewed}
+        for each in tried:
+            row: dict[str, Any] = {
+                "run": name,
+                "method": each.method,
+                "rate_hz": each.rate_hz,
+                "steady_error": math.nan,
+            }
+            row |= found.get(each, {}) | {"stable": int(math.isfinite(judged[each]))}
+            if row["stable"]:
+                row["steady_error"] = max(row["steady_error"], judged[each])  # a NaN that comes first stays
+            rows.append(row | {"unslewed_error": errors.get((each.method, each.rate_hz), math.nan)})
     facts = {"asked_hz": rate or math.nan, "amplitude": reference.amplitude, "quantum": quantum, **low_high}
-    return {"rates": pd.DataFrame(rows).assign(stable=stable, **facts)}
+    return {"rates": pd.DataFrame(rows).assign(**facts, rate_limit=of_table(rate_limit))}
+
+
+def _linear(design: Design, drive: Drive, reference: Reference) -> float:
+    """The error of the linear loop between the samples, infinite where it is not stable."""
+    if not judge_loop(design, drive, omegas=reference.frequencies).stable:
+        return math.inf
+    return error_between(design, drive, reference.amplitudes, reference.omegas)
 
 
 def rows_of(
@@ -94,7 +134,7 @@ def rows_of(
     span_s: float,
     form: str = "coprime",
     tick: Tick = lambda: None,
-) -> list[dict[str, object]]:
+) -> list[dict[str, Any]]:
     """Run a design with one anti-windup on each of several drives.
 
     Parameters
@@ -115,9 +155,9 @@ def rows_of(
         which the error stays within 1 % of the reference's amplitude around its lasting offset (empty: never). Both are
         empty where the loop diverges or the method has no controller at the rate, and read at the sampling instants.
     """
-    rows: list[dict[str, object]] = []
+    rows: list[dict[str, Any]] = []
     for drive in drives:
-        row: dict[str, object] = {"run": name, "method": drive.method, "rate_hz": drive.rate_hz}
+        row: dict[str, Any] = {"run": name, "method": drive.method, "rate_hz": drive.rate_hz}
         try:
             run = simulate_sampled(design, reference, name, drive, until_s, form=form)
         except InputError:  # among them DivergenceError
@@ -138,6 +178,16 @@ def numbers_of(time_s: np.ndarray, error: np.ndarray, span_s: float, reference: 
     }
 
 
+def continuous_error(table: pd.DataFrame, run: str) -> float:
+    """The steady error of a run in continuous time, of the table of :func:`rates_tables`."""
+    return float(table["steady_error"][(table["run"] == run) & (table["method"] == "continuous")].iloc[0])
+
+
+def is_near(row: pd.Series, continuous: float) -> bool:
+    """Whether a row's linear loop is stable, and its steady error near that in continuous time."""
+    return bool(row["stable"] == 1 and row["steady_error"] <= continuous + SETTLED * row["amplitude"])
+
+
 def lowest_rate(table: pd.DataFrame, run: str, method: str) -> float:
     """The lowest rate in Hz from which on, as far as was tried, a computer does what continuous time does.
 
@@ -154,10 +204,8 @@ def lowest_rate(table: pd.DataFrame, run: str, method: str) -> float:
         At it and at all higher rates of the table the linear loop is stable, and the steady error no more than that in
         continuous time and 1 % of the reference's amplitude; NaN where there is none.
     """
-    own = table[table["run"] == run]
-    least = float(own["steady_error"][own["method"] == "continuous"].iloc[0])
-    rows = own[own["method"] == method].sort_values("rate_hz")
-    near = ((rows["steady_error"] <= least + SETTLED * rows["amplitude"]) & (rows["stable"] == 1)).to_numpy()
-    beyond = np.flatnonzero(~near)
+    rows = table[(table["run"] == run) & (table["method"] == method)].sort_values("rate_hz")
+    least = continuous_error(table, run)
+    beyond = np.flatnonzero([not is_near(row, least) for _, row in rows.iterrows()])
     first = beyond[-1] + 1 if len(beyond) else 0
     return float(rows["rate_hz"].iloc[first]) if first < len(rows) else math.nan

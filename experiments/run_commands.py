@@ -19,7 +19,6 @@ from identification.base.files import require_writable, write_whole
 from identification.base.path_types import FIGURE_FILE, OUTPUT_FILE
 
 MOST_ROWS = 1e7
-UNJUDGED = "Whether the guarantee covers the run is not judged under disturbances"
 SHARE = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"  # of a run, in a bar
 
 _run_options = together(
@@ -130,13 +129,10 @@ def simulate_command(
     )
     saturated = last_saturation(run)
     never = not len(run.events_s) and not np.isnan(saturated)
-    if kind is None or never:
-        promised = ""
-    elif disturbances != UNDISTURBED:
-        promised = UNJUDGED
-    elif np.any(np.abs(run.modes) > 1):
-        promised = "No guarantee: the actuator was too slow for the control, and a guarantee is of limits alone"
-    else:
+    promised = ""
+    if kind is not None and not never:
+        promised = _unpromised(disturbances != UNDISTURBED, slow=bool(np.any(np.abs(run.modes) > 1)))
+    if kind is not None and not never and not promised:
         given = guarantee(content, kind, true)
         promised = str(judge_run(given, loop, limits, run, asked, true or content.loop_plant))
     writers = {output: csv_writer(table)}
@@ -234,10 +230,10 @@ def sampled_command(
     low, high = drive.limits
     beyond = run.time_s[(run.control < low) | (run.control > high)]
     last = f", the last at {beyond[-1]:.6g} s" if len(beyond) else ""
-    promised = ""
-    if kind is not None and len(beyond) and disturbances != UNDISTURBED:
-        promised = UNJUDGED
-    elif kind is not None and len(beyond):
+    promised, slow = "", run.slewed(drive)
+    if kind is not None and (len(beyond) or slow):
+        promised = _unpromised(disturbances != UNDISTURBED, slow, drive.quantum > 0)
+    if kind is not None and len(beyond) and not promised:
         steady = steady_control(asked, true or content.loop_plant, run.time_s)
         found = verdict(guarantee(content, kind, true), run.time_s, run.control, steady, drive.limits)
         promised = str(found)
@@ -249,9 +245,23 @@ def sampled_command(
         from paper_figures.look.plot_run import plot_run
         from paper_figures.look.style import figure_writer
 
-        writers[figure] = figure_writer(plot_run({anti_windup: run}, drive.limits, content.signals))
+        drawn = plot_run({anti_windup: run}, drive.limits, content.signals)
+        if "the linear loop is UNSTABLE" in judgement:
+            drawn.suptitle(f"UNSTABLE at {rate:g} Hz with the method {drive.method}")
+        writers[figure] = figure_writer(drawn)
     write_whole(writers, inputs)
     click.echo(_first(promised, f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}"))
+
+
+def _unpromised(disturbed: bool, slow: bool, rounds: bool = False) -> str:
+    """Why a run has no guarantee beside its limits; empty where nothing is the matter."""
+    if disturbed:
+        return "Whether the guarantee covers the run is not judged under disturbances"
+    if slow:
+        return "No guarantee: the actuator was too slow for the control, and a guarantee is of limits alone"
+    if rounds:
+        return "No guarantee: the actuator rounds the control, and a guarantee is of limits alone"
+    return ""
 
 
 def _first(promised: str, said: str) -> str:

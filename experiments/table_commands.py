@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
 import click
 
-from experiments.options import DESIGN, LIMIT_PAIR, OUTPUT_FOLDER, asked_limits, reference_options, sinusoid_options
+from experiments.options import (
+    DESIGN,
+    LIMIT_PAIR,
+    OUTPUT_FOLDER,
+    RATE_LIMIT,
+    asked_limits,
+    reference_options,
+    sinusoid_options,
+)
 from experiments.pair_options import PairCommand
 from experiments.tables import write_into
 from identification.base.axis_option import AXIS
-
-RATE_LIMIT = click.option(
-    "--rate-limit",
-    type=float,
-    default=math.inf,
-    help="Most change of the actuator in a second, in its unit, unknown to the controller.",
-)
 
 
 @click.command("tracking", cls=PairCommand)

@@ -11,6 +11,8 @@ import pandas as pd
 from design.design_file import Design
 from experiments.engine.simulate import limit_pair, simulate
 from experiments.runs.compare_anti_windups import (
+    SETTLED,
+    is_slewing,
     loops,
     run_all,
     span,
@@ -19,6 +21,7 @@ from experiments.runs.compare_anti_windups import (
     usual_periods,
     verdicts,
 )
+from experiments.runs.metrics import of_table, recovery
 from experiments.runs.references import Reference, SampledReference
 from experiments.runs.region import longest_run, require_within_region
 from experiments.runs.sector_promise import steady_control
@@ -60,9 +63,11 @@ def tracking_tables(
     -------
     dict
         ``tracking`` and ``tracking_summary``, see :mod:`experiments.runs.compare_anti_windups`. To the summary are
-        added steady_least and steady_greatest, between which lies the control that follows the reference,
-        linear_control, the greatest \\|u\\| of the loop without limits, and span_s, the length of what is called the
-        last period.
+        added rate_limit (empty: none), slews (1 where the actuator was too slow for the control in this run, else 0),
+        recovery_s (when the output has come to within 1 % of the reference's amplitude of the loop without limits for
+        good; empty: not before the last period), steady_least and steady_greatest, between which lies the control that
+        follows the reference, linear_control, the greatest \\|u\\| of the loop without limits, and span_s,
+        the length of what is called the last period.
 
     Raises
     ------
@@ -83,9 +88,13 @@ def tracking_tables(
     promised = verdicts(design, every, runs, pair, reference)
     steady = steady_control(reference, plant, time_s)
     summary = tracking_summary(runs, promised, pair, reference, _required(design, reference), span_s)
+    far = [run.outputs["output"] - linear.outputs["output"] for run in runs.values()]
     return {
         "tracking": tracking_table(runs, reference),
         "tracking_summary": summary.assign(
+            rate_limit=of_table(rate_limit),
+            slews=[int(is_slewing(run)) for run in runs.values()],
+            recovery_s=[recovery(time_s, each, SETTLED * reference.amplitude, span_s) for each in far],
             steady_least=float(steady.min()),
             steady_greatest=float(steady.max()),
             linear_control=float(np.abs(linear.control).max()),

@@ -207,8 +207,8 @@ def geometric_scale(*blocks: Block) -> float:
 
 
 def fastest_root(*blocks: Block) -> float:
-    """The largest modulus of a zero or pole of the blocks, rad/s."""
-    return max(abs(root) for block in blocks for root in block.zeros + block.poles)
+    """The largest modulus of a zero or pole of the blocks, rad/s; 0 without any."""
+    return max((abs(root) for block in blocks for root in block.zeros + block.poles), default=0.0)
 
 
 def _paired(roots: Iterable[complex]) -> tuple[complex, ...]:

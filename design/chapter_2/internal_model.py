@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -114,6 +115,12 @@ def _require_reference(omegas: Sequence[float], epsilon: float | None) -> None:
     shown = ", ".join(f"{omega:g}" for omega in omegas)
     if len(set(omegas)) < len(omegas):
         raise InputError(f"the reference has omega = {shown} rad/s; expected each frequency once")
+    if len(omegas) and min(omegas) == 0:
+        hertz = ", ".join(f"{omega / math.tau:g}" for omega in omegas)
+        raise InputError(
+            f"the reference has the frequencies {hertz} Hz, a constant among them, which the delay-free design does "
+            "not take; expected positive ones (its integral action, --integral-action, is what follows a constant)"
+        )
     if not (len(omegas) and all(np.isfinite(omega) and omega > 0 for omega in omegas)):
         raise InputError(f"the reference has omega = {shown} rad/s; expected one or more positive numbers")
     if epsilon is not None and not 0 < epsilon < min(omegas) ** 2:

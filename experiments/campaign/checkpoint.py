@@ -26,7 +26,7 @@ PART = re.compile(r"part-(\d+)-[0-9a-f]{64}\.parquet")
 PARTS_A_GROUP = 80  # of the file's row groups: 6000 rows
 SYNTHETIC = "plants drawn at random inside W_a, not measured"
 PACKAGES = ("antiwindup-thesis", "numpy", "scipy", "numba", "pyarrow")
-TOLD = ("synthetic", "kind", "design_sha256", "seed", "plants", "lower_limit", "limit", "horizon_s")
+TOLD = ("synthetic", "kind", "design_sha256", "seed", "plants", "lower_limit", "limit", "rate_limit", "horizon_s")
 """What the file's metadata say."""
 TEXTS, WHOLE, FLAGS = ("anti_windup",), ("plant", "events"), ("linear_stable", "diverged", "covered")
 
@@ -54,7 +54,8 @@ class CampaignFile:
 
     Notes
     -----
-    A campaign is the same if its manifest is: design, seed, number of plants, reference, limit, length, chunk, the
+    A campaign is the same if its manifest is: design, seed, number of plants, reference, limit, rate limit, length,
+    chunk, the
     code of this package and the versions of the others that compute. The name of a part holds the hash of that
     manifest and of the part's content together, so that what is read is whole and of this campaign, or is run again.
     """
@@ -71,6 +72,7 @@ class CampaignFile:
             "reference": json.loads(json.dumps(asdict(campaign.reference))),
             "lower_limit": campaign.limits[0],
             "limit": campaign.limits[1],
+            "rate_limit": campaign.rate_limit,
             "horizon_s": campaign.horizon_s,
             "chunk": CHUNK,
             "code_sha256": campaign.code_sha256,

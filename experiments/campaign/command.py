@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from experiments.options import DESIGN, LIMIT_PAIR, asked_limits, sinusoid_options
+from experiments.options import DESIGN, LIMIT_PAIR, RATE_LIMIT, asked_limits, sinusoid_options
 from experiments.pair_options import PairCommand
 from identification.base.axis_option import AXIS
 from identification.base.command_line import together
@@ -33,6 +33,7 @@ plant_options = together(
 @plant_options
 @AXIS
 @LIMIT_PAIR
+@RATE_LIMIT
 @click.option(
     "--periods",
     type=int,
@@ -47,6 +48,7 @@ def campaign_command(
     output: Path,
     anew: bool,
     limit: tuple[float, ...],
+    rate_limit: float,
     periods: int | None,
     **reference: Any,
 ) -> None:
@@ -65,4 +67,4 @@ def campaign_command(
     content = read_design(design)
     asked = sinusoids(content, **reference)
     length = periods or usual_periods(content, asked)
-    run_campaign(content, design, plants, seed, asked, limits, length, scheduler, output, anew)
+    run_campaign(content, design, plants, seed, asked, limits, length, scheduler, output, anew, rate_limit)

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.campaign.seal import SEAL, Seal
+from experiments.runs.metrics import of_table
 from identification.base.errors import InputError
 from identification.base.files import require_readable
 
@@ -36,7 +37,7 @@ COLUMNS = {
     "guaranteed_sector": "float64",
 }
 COLUMNS |= dict.fromkeys(MEASURES, "float64")
-FACTS = {"plants": int, "seed": int, "lower_limit": float, "limit": float, "horizon_s": float}
+FACTS = {"plants": int, "seed": int, "lower_limit": float, "limit": float, "rate_limit": float, "horizon_s": float}
 
 Columns = dict[str, np.ndarray]
 
@@ -56,10 +57,10 @@ def campaign_tables(path: Path) -> dict[str, pd.DataFrame]:
         recovery_s that so many of them do not exceed. ``campaign_distance``: for each run and each tenth of the
         distance (from, to) the number of plants there, and the shares of them whose linear loop is stable
         (linear_stable), whose run diverges, recovers and is covered by its guarantee; empty where there is no plant.
-        ``campaign_summary``: for each run plants, seed, lower_limit, limit, horizon_s, the four shares among all
-        plants, the guaranteed_sector (0: nothing is guaranteed of these plants), the 5, 50 and 95 % quantiles of the
-        three numbers, and worst_plant, that of the largest steady error; of several, such as those that diverge, the
-        nearest to the model.
+        ``campaign_summary``: for each run plants, seed, lower_limit, limit, rate_limit (empty: none), horizon_s, the
+        four shares among all plants, the guaranteed_sector (0: nothing is guaranteed of these plants), the 5, 50 and
+        95 % quantiles of the three numbers, and worst_plant, that of the largest steady error; of several, such as
+        those that diverge, the nearest to the model.
 
     Raises
     ------
@@ -86,7 +87,7 @@ def campaign_tables(path: Path) -> dict[str, pd.DataFrame]:
         plants, *outcomes = count
         shares = {what: part / np.where(plants, plants, np.nan) for what, part in zip(OUTCOMES, outcomes, strict=True)}
         distances.append(pd.DataFrame({"run": name, "from": edges[:-1], "to": edges[1:], "plants": plants} | shares))
-        row = {"run": name} | facts
+        row = {"run": name} | facts | {"rate_limit": of_table(facts["rate_limit"])}
         row |= {what: part.sum() / facts["plants"] for what, part in zip(OUTCOMES, outcomes, strict=True)}
         row["guaranteed_sector"] = sector
         for measure, form in MEASURES.items():

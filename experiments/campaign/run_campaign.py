@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import sys
 from pathlib import Path
 
@@ -38,6 +39,7 @@ def run_campaign(
     scheduler: str | None,
     output: Path,
     anew: bool,
+    rate_limit: float = math.inf,
 ) -> None:
     """Run a campaign, keep it, and say what came out.
 
@@ -47,7 +49,7 @@ def run_campaign(
         The design and its file.
     plants, seed
         How many plants are drawn, and from which random numbers.
-    reference, limits, periods
+    reference, limits, periods, rate_limit
         Of every run, see :class:`experiments.campaign.run_plants.Campaign`.
     scheduler
         Address of a Dask cluster's; None runs the campaign here.
@@ -64,7 +66,7 @@ def run_campaign(
             f"--plants is {plants} and --seed {seed}; expected 1 to {MOST_PLANTS} plants, a seed from 0 on"
         )
     digest = hashlib.sha256(read_bytes(design)).hexdigest()
-    campaign = Campaign(content, digest, seed, reference, limits, periods, code_sha256())
+    campaign = Campaign(content, digest, seed, reference, limits, periods, code_sha256(), rate_limit)
     with locked_file(output):
         file = CampaignFile(output, campaign, plants, design, anew)
         there = plants - sum(last - first for first, last in file.missing)
@@ -73,8 +75,9 @@ def run_campaign(
         click.echo(f"{there} of {plants} plants were there already")
     summary = campaign_tables(output)["campaign_summary"]
     click.echo(_promised(summary))
+    slow = f", at most {rate_limit:g} a second" if math.isfinite(rate_limit) else ""
     click.echo(
-        f"{plants} plants within W_a -> {output}; limits {limits_text(*limits)}, {campaign.horizon_s:.6g} s each"
+        f"{plants} plants within W_a -> {output}; limits {limits_text(*limits)}{slow}, {campaign.horizon_s:.6g} s each"
     )
     for line in _lines(summary):
         click.echo(line)

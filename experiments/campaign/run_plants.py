@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -14,7 +15,7 @@ from design.design_file import Design
 from experiments.campaign.draw_plants import PlantsWithin
 from experiments.campaign.linear_stability import PerturbedLoop
 from experiments.engine.simulate import DivergenceError, simulate
-from experiments.runs.compare_anti_windups import SETTLED, compensators, span
+from experiments.runs.compare_anti_windups import SETTLED, compensators, is_slewing, span
 from experiments.runs.design_loop import Controller, plant_loop, realized_controller
 from experiments.runs.guarantee import Guarantee, guarantee_within
 from experiments.runs.metrics import last_saturation, settling_time
@@ -51,6 +52,8 @@ class Campaign:
         Length of a run in :attr:`span_s`.
     code_sha256
         Of the code that asks for it, see :func:`code_sha256`.
+    rate_limit
+        The most that the actuator changes in a second, in its unit.
     """
 
     design: Design = field(compare=False)
@@ -60,6 +63,7 @@ class Campaign:
     limits: tuple[float, float]
     periods: int
     code_sha256: str
+    rate_limit: float = math.inf
 
     @property
     def span_s(self) -> float:
@@ -125,7 +129,7 @@ def run_chunk(campaign: Campaign, first: int, last: int) -> Columns:
             Whether the guarantee covers the run, see :mod:`experiments.runs.sector_promise`.
         largest_control, needed_sector
             The largest |u|, and the sector that the run needs, infinite where the reference takes a control that
-            reaches a limit; None where nothing is guaranteed.
+            reaches a limit; None where nothing is guaranteed, or the actuator was too slow for the control.
         gain, delay_s, zero_omega_1, zero_zeta_1, ..., real_zero_1, ...
             The true plant.
 
@@ -194,10 +198,10 @@ class _Runner:
         limits = self.campaign.limits
         promised = {"guaranteed_sector": given.sector, "covered": False, "largest_control": None, "needed_sector": None}
         try:
-            run = simulate(loop, limits, self.time_s)
+            run = simulate(loop, limits, self.time_s, rate=self.campaign.rate_limit)
         except DivergenceError:
             return {"diverged": True} | promised | dict.fromkeys(MEASURED)
-        if given.sector:
+        if given.sector and not is_slewing(run):  # a guarantee is of limits alone
             found = judge_run(given, loop, limits, run, self.reference, plant)
             promised |= {"covered": found.covered, "largest_control": found.largest_control}
             promised |= {"needed_sector": found.needed_sector}

@@ -17,7 +17,11 @@ from identification.model.model_file import IdentifiedModel
 from identification.sweeps.response import FrequencyResponse
 
 LEVEL = 0.01
-"""Probability with which a check finds that something moved though nothing did: half for W_a, half for parameters."""
+"""Probability with which a check finds that something moved though nothing did: half for W_a, half for parameters.
+
+It holds where tests of the plant, old and new, differ by noise alone. Where they differ by more, a plant outside W_a
+need not have moved, and the rates are those that docs/check.md has measured.
+"""
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,8 @@ class SweepCheck:
         With its own fit in the model's structure; or why no such plant fits.
     at_lines, between_lines
         Where it comes farthest from the model; None without a fit.
+    beyond_fit
+        Where a line comes farthest beyond both W_a and the sweep's own fit; None without a fit.
     moves
         Of each parameter; None where the model does not say how sure its own are, or without a fit.
     design
@@ -47,6 +53,7 @@ class SweepCheck:
     sweep: NewSweep | str
     at_lines: Reach | None = None
     between_lines: Reach | None = None
+    beyond_fit: Reach | None = None
     moves: tuple[Move, ...] | None = None
     design: OnPlant | None = None
     new_at: float | None = None
@@ -113,6 +120,7 @@ def _checked(model: IdentifiedModel, test: FrequencyResponse, design: Design | N
         sweep,
         at_lines=reach_at_lines(model, sweep),
         between_lines=reach_between_lines(model, sweep),
+        beyond_fit=reach_at_lines(model, sweep, or_fit=True),
         moves=None if model.fit is None else moves(model, model.fit, sweep, share),
         design=None if design is None else on_plant(design, sweep.fit.plant),
         new_at=None if model.fit is None else _new_at(model.fit, sweep),

@@ -50,9 +50,15 @@ class Move:
 
     @property
     def share(self) -> float:
-        """By what share of the model's value it moved; infinite from 0."""
+        """By what share of the model's value it moved, above 0 where its magnitude grew; infinite from 0."""
         before = self.parameter.value
-        return (self.value - before) / abs(before) if before else float(np.inf) * (self.value > 0)
+        return self.value / before - 1 if before else float(np.inf) * (self.value > 0)
+
+
+def tests_differ(record: FitRecord) -> bool:
+    """Whether a model's tests differ by more than their noise, so that another one will, too."""
+    agree = record.agreement_of_tests
+    return record.scatter is not None and agree is not None and agree < ONE_PLANT
 
 
 def moves(model: IdentifiedModel, record: FitRecord, sweep: NewSweep, level: float) -> tuple[Move, ...]:
@@ -83,8 +89,7 @@ def moves(model: IdentifiedModel, record: FitRecord, sweep: NewSweep, level: flo
     noise, misfit = np.array(record.noise) / unit, np.array(record.misfit) / unit
     own = np.diag(sure.covariance)
     parts = [(own * (1 + fit.misfit), sure.freedom)]
-    agree = record.agreement_of_tests
-    if record.scatter is not None and agree is not None and agree < ONE_PLANT:
+    if tests_differ(record):
         spread = count * (np.array(record.scatter) / unit) ** 2
         noisier = np.maximum(own * (1 + fit.misfit) - count * noise**2, 0.0)
         parts = [(noisier, sure.freedom), (spread * (1 + 1 / count), np.full(own.size, count - 1.0))]

@@ -41,8 +41,16 @@ class Reach:
         return self.distance / self.bound
 
 
-def reach_at_lines(model: IdentifiedModel, sweep: NewSweep) -> Reach:
+def reach_at_lines(model: IdentifiedModel, sweep: NewSweep, *, or_fit: bool = False) -> Reach:
     """How far the lines of a sweep lie from the model.
+
+    Parameters
+    ----------
+    model, sweep
+        The model and the new sweep with its own fit.
+    or_fit
+        Whether W_a is as large as the distance of that fit where it is smaller: what is left beyond, no plant of the
+        model's structure explains.
 
     Notes
     -----
@@ -53,6 +61,8 @@ def reach_at_lines(model: IdentifiedModel, sweep: NewSweep) -> Reach:
     omega = sweep.test.omega
     distance = np.abs(sweep.test.response - model.plant(1j * omega))
     bound = np.abs(model.additive_bound(1j * omega))
+    if or_fit:
+        bound = np.maximum(bound, np.abs(sweep.fit.plant(1j * omega) - model.plant(1j * omega)))
     beyond = np.maximum(distance - bound, 0.0) / sweep.noise
     nu = sweep.freedom
     chance = np.exp(-nu / 2 * np.log1p(2 * beyond**2 / nu))

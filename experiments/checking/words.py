@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from math import inf, isinf, pi
 
 from design.stability.margins import Margins
-from experiments.checking.answers import Outcome, answers, answers_of_sweep, relative
+from experiments.checking.answers import ROUNDING, Outcome, answers, answers_of_sweep, relative
 from experiments.checking.check_model import ModelCheck, SweepCheck
 from experiments.checking.parameter_moves import Move
 
@@ -16,23 +16,38 @@ HEAD = ("parameter", "model", "sweep", "moved", "standard errors", "found from")
 def first_sentence(found: ModelCheck) -> str:
     """What to do and why, in one sentence without its full stop."""
     given = answers(found)
-    moved: dict[str, str] = {}  # of each question that of the first sweep
-    for each in given:
-        if each.outcome is Outcome.MOVED:
-            moved.setdefault(each.question, each.sentence + (f" ({each.sweep})" if len(found.sweeps) > 1 else ""))
-    held = {each.question for each in given if each.outcome is Outcome.HOLDS} - moved.keys()
-    if not moved:
+    failed: dict[str, str] = {}  # of each question that of the first sweep, rather one that moved
+    for question in dict.fromkeys(each.question for each in given):
+        failing = [each for each in given if each.question == question and each.outcome.fails]
+        if failing:
+            each = min(failing, key=lambda each: each.outcome is Outcome.OUTSIDE)
+            failed[question] = each.sentence + (f" ({each.sweep})" if len(found.sweeps) > 1 else "")
+    held = {each.question for each in given if each.outcome is Outcome.HOLDS} - failed.keys()
+    if not failed:
         reasons = ["every sweep lies within W_a" if len(found.sweeps) > 1 else "the sweep lies within W_a"]
-        reasons += ["no parameter moved"] if "parameters" in held else []
+        reasons[0] += " but for noise" if any(map(_is_beyond, found.sweeps)) else ""
+        reasons += ["no parameter moved by more than chance"] if "parameters" in held else []
         untold = dict.fromkeys(each.question for each in given if each.outcome is Outcome.OPEN)
         rest = f"; not told: {', '.join(untold)}" if untold else ""
         return f"Nothing to do: {', '.join([*reasons, *_design_keeps(held)])}{rest}"
-    todo = "Fit a new model and design again" if moved.keys() & {"margins", "guarantee"} else "Fit a new model"
+    outcomes = {each.outcome for each in given}
+    todo = "Fit a new model"
+    if Outcome.OUTSIDE in outcomes and Outcome.MOVED not in outcomes:
+        todo += f" to the old tests and the new {'sweeps' if len(found.sweeps) > 1 else 'sweep'} together"
+    todo += " and design again" if Outcome.LOST in outcomes else ""
     if any(sweep.design is not None and sweep.design.sector is None for sweep in found.sweeps):
         todo = "Do not run this design"
-        moved.pop("guarantee", None)  # there is none without a stable loop
-    after = [*_design_keeps(held), *(["whether a design may stay, --against says"] if found.promise is None else [])]
-    return f"{todo}: {'; '.join([*moved.values(), *after])}"
+        failed.pop("guarantee", None)  # there is none without a stable loop
+    after = _design_keeps(held)
+    if Outcome.MOVED in outcomes and found.model.fit is not None and len(found.model.fit.tests) == 1:
+        after += ["the model's single test does not say how much tests of one plant differ"]
+    after += ["whether a design may stay, --against says"] if found.promise is None else []
+    return f"{todo}: {'; '.join([*failed.values(), *after])}"
+
+
+def _is_beyond(sweep: SweepCheck) -> bool:
+    reaches = (sweep.at_lines, sweep.between_lines)
+    return any(reach is not None and reach.ratio > 1 + ROUNDING for reach in reaches)
 
 
 def _design_keeps(held: set[str]) -> list[str]:

@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from design.design_file import Design
+from experiments.drive.difference_equations import MOST_LATE
 from experiments.drive.judge_loop import UNFOLLOWED, LoopJudgement, judge_loop
 from experiments.drive.matched_controller import is_matched
 from experiments.drive.sampled_loop import FORMS, METHODS, Drive
+from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
 RATES = 16  # a decade, of a search
@@ -46,6 +48,8 @@ class LeastRate:
         low, high = self.searched_hz
         if not math.isfinite(self.stable_hz):
             return f"{self.method}: at no rate of those tried, {low:.4g} to {high:.4g} Hz"
+        if not self.unstable_hz:
+            return f"{self.method}: at every rate tried, {low:.4g} to {high:.4g} Hz"
         return f"{self.method}: from {self.stable_hz:.4g} Hz on, as far as rates up to {high:.4g} Hz were tried"
 
 
@@ -58,12 +62,18 @@ def judge_methods(
 ) -> list[LoopJudgement]:
     """The judgements with every method there is for the design, the best first.
 
-    That is a stable one of least steady error, and of the most margin among those whose steady errors are below
-    UNFOLLOWED.
+    That is a stable one of least steady error, at and between the samples. Errors below UNFOLLOWED are alike, and so
+    are those whose first two digits are. Among alike ones it is that of the most margin, and among alike margins the
+    first of METHODS. The last are those that no computer can run.
     """
     methods = [method for method in METHODS if method != "matched" or is_matched(design)]
     found = [judge_loop(design, replace(drive, method=method), plant, omegas, form) for method in methods]
-    return sorted(found, key=lambda each: (max(each.steady_error, UNFOLLOWED), -each.modulus_margin))
+
+    def order(each: LoopJudgement) -> tuple[bool, float, float]:
+        error, margin = (float(f"{value:.1e}") for value in (max(each.steady_error, UNFOLLOWED), each.modulus_margin))
+        return bool(each.refused), error, -margin
+
+    return sorted(found, key=order)
 
 
 def least_rate(design: Design, drive: Drive, plant: PlantModel | None = None, form: str = FORMS[0]) -> LeastRate:
@@ -84,6 +94,9 @@ def least_rate(design: Design, drive: Drive, plant: PlantModel | None = None, fo
     roots = [abs(root) for block in design.controller_parts() for root in block.zeros + block.poles]
     low, high = 2.1 * fastest, SPAN * max([fastest, *roots]) / (2 * math.pi)
     low = low or high / SPAN**2
+    longest = max(design.loop_plant.delay_s, (design.loop_plant if plant is None else plant).delay_s)
+    if late_s := longest + drive.input_delay_s:
+        high = max(min(high, MOST_LATE / late_s), low)  # above which no computer runs it
 
     def stable(rate: float) -> bool:
         return judge_loop(design, replace(drive, rate_hz=rate), plant, form=form).stable
@@ -125,16 +138,25 @@ def choose_method(
     drive, sentence
         The sentence says of which method the loop is stable at the rate, with which steady error; where the loop is
         not stable with the drive's method, also from which rate on it is.
+
+    Raises
+    ------
+    InputError
+        No computer can run the controller at this rate with the method that is asked for, or with any.
     """
     found = judge_methods(design, drive, plant, omegas, form)
     if method and method not in [each.method for each in found]:
         found.append(judge_loop(design, replace(drive, method=method), plant, omegas, form))
     first = next((each for each in found if each.method == method), found[0])
+    if first.refused and method:
+        raise InputError(first.refused)
+    if first.refused:
+        raise InputError(f"no method can run the controller at {first.rate_hz:g} Hz; {first.method}: {first.refused}")
     others = [f"; {each.method}: {each}" for each in found if each != first and not each.refused]
     why = "" if method else ", which is chosen,"
     said = f"At {first.rate_hz:g} Hz with the method {first.method}{why} the linear loop is {first}{''.join(others)}"
     if not first.stable:
-        sought = [first] if found[0].stable else found
+        sought = [first] if found[0].stable else [each for each in found if not each.refused]
         searched = (str(least_rate(design, replace(drive, method=each.method), plant, form)) for each in sought)
         said += f". It is stable with {'; '.join(searched)}"
     return replace(drive, method=first.method), said

@@ -14,6 +14,7 @@ from identification.base.errors import InputError
 
 METHODS = ("tustin", "exact")
 
+MOST_LATE = 100_000  # samples of dead time
 WHOLE = 1e-9  # of a sample: a dead time nearer than this to a whole number of samples is one
 
 
@@ -45,8 +46,19 @@ class SampledBlock(NamedTuple):
 
 
 def split(delay_s: float, sample_time_s: float) -> tuple[int, float]:
-    """A dead time as whole samples and the rest, a share of a sample in [0, 1)."""
+    """A dead time as whole samples and the rest, a share of a sample in [0, 1).
+
+    Raises
+    ------
+    InputError
+        It is longer than :data:`MOST_LATE` samples.
+    """
     samples = delay_s / sample_time_s
+    if samples > MOST_LATE * (1 + WHOLE):
+        raise InputError(
+            f"the dead time with the input delay is {delay_s:.6g} s, {samples:.6g} samples at "
+            f"{1 / sample_time_s:.6g} Hz; expected at most {MOST_LATE} samples"
+        )
     whole = math.floor(samples + WHOLE)
     rest = samples - whole
     return whole, rest if rest > WHOLE else 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from flint import acb, arb, arb_mat
 
@@ -10,8 +12,12 @@ from design.blocks.block import Block, plant_block
 from design.blocks.state_space import realize
 from design.chapters_3_4.tracking import factored
 from experiments.drive.difference_equations import SampledBlock, held, split
+from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
+
+BETWEEN = 32  # instants in a sample, and in half a period of the plant's fastest mode
+MOST_BETWEEN = 1000
 
 
 def image(root: complex, sample_time_s: float) -> complex:
@@ -104,3 +110,49 @@ def sampled_plant(plant: PlantModel, sample_time_s: float) -> SampledBlock:
         length=np.array([1]),
         taps=np.ones((1, 1)),
     )
+
+
+def between_samples(
+    plant: PlantModel, sample_time_s: float, more_delay_s: float, omega: float, output: complex, control: complex | None
+) -> tuple[Real, Complex]:
+    """The output of a plant with a held input between the samples, in the steady state under a sinusoid.
+
+    Parameters
+    ----------
+    plant, sample_time_s, more_delay_s
+        As of :func:`held_plant`.
+    omega
+        Of the sinusoid, rad/s.
+    output, control
+        Complex amplitudes: the output is Re(output exp(j omega t)) at the samples, and so is the control; without
+        ``control`` it is found from the output.
+
+    Returns
+    -------
+    late_s, amplitudes : ndarray, shape (k,)
+        From :data:`BETWEEN` instants of a sample on, both ends included: at these times after a sample, some of which
+        are negative, the output is Re(amplitude exp(j omega t_sample)).
+
+    Notes
+    -----
+    With z = exp(j omega T) the state X exp(j omega t_sample) obeys z X = exp(A T) X + (integral of exp(A t) b) V. Where
+    the output is given, C X + D V as it is read is a further equation, so that poles of the plant at z do not matter.
+    """
+    whole, rest = split(plant.delay_s + more_delay_s, sample_time_s)
+    P, read = realize(plant_block(plant)), (1 - rest) * sample_time_s
+    n, turn = len(P.b), np.exp(1j * omega * sample_time_s)
+    (A, b), (ahead, into) = held(P, sample_time_s), held(P, read)
+    equations = np.zeros((n + 1, n + 1), dtype=complex)
+    equations[:n] = np.column_stack([turn * np.eye(n) - A, -b]) / sample_time_s
+    equations[n] = [*P.C[0] @ ahead, P.C[0] @ into + P.d[0]] if control is None else [*np.zeros(n), 1.0]
+    state = np.linalg.solve(equations, [*np.zeros(n), output if control is None else control * turn ** -(whole + 1.0)])
+    fastest = max([omega, *(abs(pole.imag) for pole in plant_block(plant).poles)])
+    count = BETWEEN * min(max(math.ceil(fastest * sample_time_s / math.pi), 1), MOST_BETWEEN // BETWEEN)
+    A, b = held(P, sample_time_s / count)
+    step = np.block([[A, b[:, None]], [np.zeros((1, n)), np.ones((1, 1))]])
+    found = []
+    for _ in range(count + 1):
+        found.append(complex(P.C[0] @ state[:n] + P.d[0] * state[n]))
+        state = step @ state
+    late_s = np.linspace(0.0, sample_time_s, count + 1) - read
+    return late_s, np.array(found)

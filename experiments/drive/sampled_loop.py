@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from design.anti_windup.compensator import AntiWindup
-from design.blocks.block import Block, plant_block
+from design.blocks.block import Block, fastest_root, plant_block
 from design.blocks.state_space import StateSpace, block_diagonal, realize
 from design.chapters_3_4.realisation import realised
 from design.design_file import Asked, Design
@@ -28,6 +28,7 @@ METHODS = ("matched", *RULES)
 """How the controller is discretised."""
 FORMS = ("coprime", "thesis")
 """How the controller is realised."""
+FAR = 1e15  # times the fastest root, or as many times less: a rate with which numbers are rounding
 MOST_LEVELS = 2.0**53  # which are still whole numbers
 SPARE = 1e-12  # relative: the quotient of two decimals may come out a rounding below a whole number
 
@@ -127,6 +128,11 @@ class SampledRun:
     control: np.ndarray
     saturated_control: np.ndarray
     measured: np.ndarray | None = None
+
+    def slewed(self, drive: Drive) -> bool:
+        """Whether the actuator of the run's drive was ever still on its way when the next command was issued."""
+        asked = np.clip(np.append(0.0, self.control), *drive.limits)
+        return bool(np.any(np.abs(np.diff(asked)) > drive.rate_limit / drive.rate_hz))
 
     def __repr__(self) -> str:
         return f"SampledRun({self.time_s.size} samples up to {self.time_s[-1]:.6g} s)"
@@ -243,6 +249,12 @@ def controller_blocks(
     """What makes v of e, and of v; theta1~, and theta2 behind its dead time; what v takes of itself at once."""
     if form not in FORMS:
         raise InputError(f"the form is '{form}'; expected {' or '.join(FORMS)}")
+    fastest = fastest_root(*design.controller_parts(), plant_block(design.loop_plant))
+    if fastest and not fastest / FAR <= drive.rate_hz <= fastest * FAR:
+        raise InputError(
+            f"the rate is {drive.rate_hz:g} Hz, and the loop's fastest root {fastest:.3g} rad/s; expected a rate "
+            "nearer to it"
+        )
     if drive.method == "matched":
         forward, feedback, theta = matched_controller(design, anti_windup, 1 / drive.rate_hz, form)
     else:

@@ -20,6 +20,7 @@ from identification.model.signals import Signals
 
 PRECISIONS: dict[str, type[np.floating]] = {"double": np.float64, "float": np.float32}
 WIDTH = 116
+ANOTHER = 0.01  # of the largest: commands that differ by more are those of another controller
 
 
 def files(controller: SampledController, run: CheckRun, precision: str = "double") -> dict[str, str]:
@@ -37,7 +38,8 @@ def files(controller: SampledController, run: CheckRun, precision: str = "double
     Raises
     ------
     InputError
-        A number of the controller or of the run is beyond a float.
+        A number of the controller or of the run is beyond a float, a limit is below what a float holds to all its
+        digits, or the commands of the run differ by more than :data:`ANOTHER`.
     """
     name, kind = controller.name, PRECISIONS[precision]
     given, seen = names(controller.signals)
@@ -51,6 +53,10 @@ def files(controller: SampledController, run: CheckRun, precision: str = "double
 
     def table(values: Iterable[float]) -> str:
         return "\n".join(f"    {line}" for line in wrap(", ".join(map(number, values)), WIDTH, break_on_hyphens=False))
+
+    for limit in controller.limits:
+        if 0 < abs(limit) < float(np.finfo(kind).tiny):
+            raise InputError(f"the controller has the limit {limit:g}, which no {precision} holds; expected another")
 
     environment = templates(number=number, rows=table, comment=_comment)
     content = {
@@ -89,7 +95,14 @@ def _difference(controller: SampledController, run: CheckRun, kind: type[np.floa
         found = commands(controller, run.reference, run.measurement, kind)
     if not np.isfinite(found).all():
         raise InputError("the run of its test takes the controller beyond what a float holds; expected doubles")
-    pairs = zip(found, (run.control, run.command), strict=True)
+    pairs = list(zip(found, (run.control, run.command), strict=True))
+    for own, exact in pairs:
+        apart, largest = float(np.abs(own - exact).max()), float(np.abs(exact).max())
+        if apart > ANOTHER * largest:
+            raise InputError(
+                f"in floats the controller is another: in its test a command differs by {apart:.3g} where the largest "
+                f"is {largest:.3g}; expected doubles"
+            )
     most = max(float(np.abs(own - each).max()) for own, exact in pairs for each in (exact, exact.astype(kind)))
     return float(upper_end(most * (1 + float(np.finfo(kind).eps)), 3))
 

@@ -18,6 +18,7 @@ SAMPLES = 1000  # and at least MEMORIES times what the controller remembers
 MEMORIES = 3
 PERIODS = 2  # of the reference
 BEYOND = 2.0  # times the farther limit, the control without limits
+HUGE = 1e100  # a limit beyond which no run is taken
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,11 @@ class CheckRun:
     control: np.ndarray
     command: np.ndarray
 
+    @property
+    def saturates(self) -> bool:
+        """Whether the control goes beyond the limits."""
+        return bool(np.any(self.control != self.command))
+
     def csv(self) -> str:
         """The samples as CSV; as many digits as tell every double from its neighbours."""
         lines = ["time_s,reference,measurement,unsaturated_command,command"]
@@ -51,6 +57,8 @@ class CheckRun:
 
 def check_run(design: Design, controller: SampledController) -> CheckRun:
     """A run of the sampled loop from rest, under a cosine that takes the control beyond the limits.
+
+    Where both limits are beyond :data:`HUGE`, the cosine is 1 and nothing saturates.
 
     Parameters
     ----------
@@ -74,7 +82,7 @@ def check_run(design: Design, controller: SampledController) -> CheckRun:
         return found.reference[:samples], found.output[:samples], found.control[:samples]
 
     _, _, free = run(1.0, (-math.inf, math.inf))
-    farther = max((abs(limit) for limit in controller.limits if math.isfinite(limit)), default=0.0)
+    farther = max((abs(limit) for limit in controller.limits if abs(limit) < HUGE), default=0.0)
     largest = float(np.abs(free).max())
     amplitude = BEYOND * farther / largest if farther > 0 and largest > 0 else 1.0
     reference, measurement, control = run(amplitude, controller.limits)

@@ -12,7 +12,7 @@ from design.design_file import Design
 from experiments.physical_limits.intervals import Interval
 from experiments.physical_limits.least_peak_error import RestLimit, Tick, finite_limits, harmonic, periodic_limit
 from experiments.runs.compare_anti_windups import NAMES, SETTLED, loops, run_all
-from experiments.runs.metrics import settling_time
+from experiments.runs.metrics import of_table, settling_time
 from experiments.runs.references import Reference
 from identification.model.plant import PlantModel
 
@@ -29,6 +29,7 @@ def limits_tables(
     limits: Sequence[float | Sequence[float]],
     tick: Tick = lambda: None,
     names: Sequence[str] = NAMES,
+    rate_limit: float = math.inf,
 ) -> dict[str, pd.DataFrame]:
     """What the runs without and with anti-windup leave to gain, under several limits.
 
@@ -44,20 +45,23 @@ def limits_tables(
         Called after every program and after every set of runs.
     names
         The anti-windups that are run, see :meth:`design.design_file.Design.chosen`.
+    rate_limit
+        The most that the actuator changes in a second, of the runs; what no controller betters is that of the limits.
 
     Returns
     -------
     dict
         ``limits_KIND``, a row for each limit, from the nearest pair to the farthest: lower_limit, limit (the upper
-        one), required (the most that the control of perfect tracking reaches), periodic_lower, periodic_upper;
-        settling_lower_s, settling_upper_s (from rest, to within 1 % of the reference's amplitude, see
+        one), rate_limit (empty: none), required (the most that the control of perfect tracking reaches),
+        periodic_lower, periodic_upper; settling_lower_s, settling_upper_s (from rest, to within 1 % of the reference's
+        amplitude, see
         :meth:`experiments.physical_limits.least_peak_error.RestLimit.settling`); and for every run NAME peak_NAME
         (greatest |error| over the last of twelve periods), settling_NAME_s (to the same band), ratio_NAME (peak_NAME
         over periodic_lower). Cells are empty for what never settles, diverges, or would be divided by zero.
-        ``limits_KIND_summary`` for the first limit: lower_limit, limit, start_s, rest_lower, rest_upper (see
-        :class:`experiments.physical_limits.least_peak_error.RestLimit`) and tail_NAME, the greatest |error| of the run
-        from start_s to the horizon of three periods. The runs' controls are found ones too: where one does better,
-        rest_upper and settling_upper_s are its own.
+        ``limits_KIND_summary`` for the first limit: lower_limit, limit, rate_limit, start_s, rest_lower, rest_upper
+        (see :class:`experiments.physical_limits.least_peak_error.RestLimit`) and tail_NAME, the greatest |error|
+        of the run from start_s to the horizon of three periods. The runs' controls are found ones too: where one does
+        better, rest_upper and settling_upper_s are its own.
 
     Raises
     ------
@@ -69,14 +73,15 @@ def limits_tables(
     harmonic(plant, reference)
     pairs = [finite_limits(plant, limit) for limit in limits]
     rest = RestLimit(plant, reference, pairs[0], tick=tick)
-    summary = rest.table().assign(**_named(pairs[0]))
+    summary = rest.table().assign(**_named(pairs[0]), rate_limit=of_table(rate_limit))
     evenly = np.linspace(0.0, RUN_PERIODS * reference.period_s, RUN_PERIODS * SAMPLES_PER_PERIOD + 1)
     time_s, every, rows = np.union1d(evenly, summary["start_s"]), loops(design, reference, names), []
     for pair in sorted(set(pairs), key=lambda pair: (pair[1] - pair[0], pair)):
-        runs = run_all(every, pair, time_s)
+        runs = run_all(every, pair, time_s, rate_limit)
         tick()
         errors = {run: np.abs(result.outputs["error"]) for run, result in runs.items()}
-        rows.append(_named(pair) | {"required": required} | _row(plant, reference, pair, time_s, errors, tick))
+        facts = _named(pair) | {"rate_limit": of_table(rate_limit), "required": required}
+        rows.append(facts | _row(plant, reference, pair, time_s, errors, tick))
         if pair == pairs[0]:
             counted = time_s <= rest.horizon_s
             for run, error in errors.items():

@@ -85,11 +85,15 @@ class Comparison:
     def _sentence(self, name: str) -> str:
         own, none = self.outcomes[name], self.outcomes["none"]
         did = [self._did(each) for each in (own, none)]
-        worse = "WORSE" if self.is_worse(name) else "no worse"
-        return (
-            f"{name} is {worse} than no anti-windup under the limits {limits_text(*self.limits)}, from rest under a "
-            f"reference that begins at its crest: it {did[0]}; none {did[1]}"
+        where = (
+            f"under the limits {limits_text(*self.limits)}, from rest under a reference that begins at its crest: "
+            f"it {did[0]}; none {did[1]}"
         )
+        if self.is_worse(name):
+            return f"{name} is WORSE than no anti-windup {where}"
+        if math.isinf(own.recovery_s):
+            return f"neither with {name} nor without anti-windup does the loop follow {where}"
+        return f"{name} is no worse than no anti-windup {where}"
 
     def _did(self, outcome: Outcome) -> str:
         """What a run does: recovered is y within BAND of what it is without limits, off how far it is from that."""

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from design.anti_windup.compensator import AntiWindup
+from design.anti_windup.other_anti_windups import OTHERS
 from design.design_file import Design
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import DivergenceError, Run, limit_pair, simulate
@@ -19,6 +20,7 @@ from experiments.runs.metrics import last_saturation, over_last, settling_time
 from experiments.runs.references import Reference, SampledReference
 from experiments.runs.sector_promise import judge_run
 from experiments.runs.verdict import Verdict
+from identification.base.errors import InputError
 
 SETTLED = 0.01  # band of the settling time, as a share of the reference's amplitude
 PERIODS, MOST_PERIODS = 5, 200
@@ -30,6 +32,18 @@ NAMES = ("none", "thesis", "corrected")
 def compensators(design: Design, names: Sequence[str] = NAMES) -> dict[str, AntiWindup | None]:
     """The anti-windups of these names, see :meth:`design.design_file.Design.chosen`."""
     return {name: design.chosen(name) for name in names}
+
+
+def anti_windups(design: Design) -> tuple[dict[str, AntiWindup | None], dict[str, str]]:
+    """No anti-windup, those that a design holds and those of others, by name; and why some of these do not exist."""
+    found: dict[str, AntiWindup | None] = {"none": None}
+    refused = {}
+    for name in (*design.anti_windup, *OTHERS):
+        try:
+            found[name] = design.chosen(name)
+        except InputError as error:
+            refused[name] = str(error)
+    return found, refused
 
 
 def loops(
@@ -88,6 +102,11 @@ def _run(loop: SaturatedLoop, limits: tuple[float, float], time_s: np.ndarray, r
         )
 
 
+def is_slewing(run: Run) -> bool:
+    """Whether the actuator was too slow for the control anywhere in a run."""
+    return bool(np.any(np.abs(run.modes) > 1))
+
+
 def verdicts(
     design: Design,
     loops: Mapping[str, SaturatedLoop],
@@ -103,7 +122,7 @@ def verdicts(
     return {
         name: judge_run(guarantee(design, kind), loops[name], limit_pair(limit), run, reference, design.loop_plant)
         for name, kind in kinds.items()
-        if np.isfinite((run := runs[name]).control[-1]) and not np.any(np.abs(run.modes) > 1)
+        if np.isfinite((run := runs[name]).control[-1]) and not is_slewing(run)
     }
 
 

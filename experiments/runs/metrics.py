@@ -27,6 +27,17 @@ def settling_time(time_s: np.ndarray, error: np.ndarray, band: float) -> float:
     return float("nan") if outside[-1] == len(time_s) - 1 else float(time_s[outside[-1] + 1])
 
 
+def recovery(time_s: np.ndarray, distance: np.ndarray, band: float, span_s: float) -> float:
+    """The first sample time after which a distance stays within ``band``; NaN where it does not all the last span."""
+    settled = settling_time(time_s, distance, band)
+    return settled if settled <= time_s[-1] - span_s else float("nan")
+
+
+def of_table(rate_limit: float) -> float:
+    """A rate limit as a cell of a table: empty where there is none."""
+    return rate_limit if np.isfinite(rate_limit) else float("nan")
+
+
 def over_last(time_s: np.ndarray, error: np.ndarray, span_s: float) -> tuple[float, float]:
     """Offset (middle between the extremes) and ripple (half their distance) of the error over the last ``span_s``."""
     tail = error[time_s >= time_s[-1] - span_s]

@@ -16,7 +16,7 @@ from design.design_file import Design
 from experiments.runs.compare_anti_windups import SETTLED
 from paper_figures.axis_figures.labels import KINDS, look_of
 from paper_figures.look import panels
-from paper_figures.look.captions import at_least, duration, limits_said, only, with_unit
+from paper_figures.look.captions import actuator_said, at_least, duration, only, with_unit
 from paper_figures.look.style import FULL_WIDTH, LINES, styled
 
 TABLES: tuple[str, ...] = ("compare", "compare_runs")
@@ -49,7 +49,7 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
         physical = f" From {duration(from_s)} after the start on {forced} by the limits."
     return (
         "The anti-windups that there are for this design, each in the same loop under the limits "
-        f"{limits_said(table, signals.input_unit)}. (a) From rest, and (b) after a disturbance of "
+        f"{actuator_said(table, signals.input_unit)}. (a) From rest, and (b) after a disturbance of "
         f"{with_unit(half, signals.input_unit)} at the plant's input, for a tenth of a period: how far the output is "
         "from that of the loop without limits, over the reference's amplitude; dotted, 1 %, which counts as recovered. "
         "(c), (d) The recovery time and the greatest control asked for, over the larger limit. A full marker: recovery "

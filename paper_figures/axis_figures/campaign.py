@@ -14,7 +14,7 @@ from matplotlib.ticker import NullFormatter
 from design.design_file import Design
 from paper_figures.axis_figures.labels import KINDS, look_of, united
 from paper_figures.look import panels
-from paper_figures.look.captions import duration, limits_said, number, of_run, only, time_unit, with_unit
+from paper_figures.look.captions import actuator_said, duration, number, of_run, only, time_unit, with_unit
 from paper_figures.look.style import FULL_WIDTH, LINES, styled
 
 TABLES: tuple[str, ...] = ("campaign", "campaign_summary", "campaign_distance")
@@ -36,7 +36,7 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
     summary, signals = tables["campaign_summary"], design.signals
     return (
         f"SYNTHETIC: {int(only(summary, 'plants'))} plants drawn within W_a (seed {int(only(summary, 'seed'))}), each "
-        f"in the loop of the same design, under the limits {limits_said(summary, signals.input_unit)}, for "
+        f"in the loop of the same design, under the limits {actuator_said(summary, signals.input_unit)}, for "
         f"{duration(only(summary, 'horizon_s'))} of the reference. How they lie within W_a is a choice of the program, "
         "so the shares are no probabilities of a real plant. (a) to (c) The share of all the plants whose numbers are "
         "no larger: the greatest error after a quarter of the reference's period, that of the last period, and the "

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from design.design_file import Design
 from paper_figures.axis_figures.labels import KINDS, look_of, united
 from paper_figures.look import panels
-from paper_figures.look.captions import duration, limits_said
+from paper_figures.look.captions import actuator_said, duration, only
 from paper_figures.look.style import FULL_WIDTH, LINES, figure, styled
 
 TABLES: tuple[str, ...] = ("limits_extended", "limits_extended_summary")
@@ -31,13 +31,16 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the caption with the numbers of the tables."""
     row = tables["limits_extended"].iloc[0]
     best, corrected, none = (_after(float(row[f"settling_{name}_s"])) for name in ("upper", *RUNS))
+    summary = tables["limits_extended_summary"]
+    is_fast = math.isnan(only(summary, "rate_limit"))
+    slopes = "" if is_fast else " Both know no rate limit; the runs have it."
     return (
         f"How much is left to gain from rest under the limits "
-        f"{limits_said(tables['limits_extended_summary'], design.signals.input_unit)}: the greatest error from a time "
-        "on, within three periods. Grey: what no control within the limits betters, even if it knows the reference in "
-        "advance; the line on it, or above, is reached by some control. The error comes to stay within 1 % of the "
-        f"reference's amplitude {best} under the best control that was found, {none} without anti-windup, {corrected} "
-        "with the corrected one."
+        f"{actuator_said(summary, design.signals.input_unit)}: the greatest error from a time on, within three "
+        "periods. Grey: what no control within the limits betters, even if it knows the reference in advance; the line "
+        f"on it, or above, is reached by some control.{slopes} The error comes to stay within 1 % of the reference's "
+        f"amplitude {best} under the best control that was found, {none} without anti-windup, {corrected} with the "
+        "corrected one."
     )
 
 

@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from design.design_file import Design
-from experiments.rates import lowest_rate
+from experiments.rates import FOLLOWED, continuous_error, lowest_rate
 from experiments.runs.compare_anti_windups import SETTLED
 from paper_figures.axis_figures.labels import KINDS, look_of, united
 from paper_figures.look import panels
-from paper_figures.look.captions import hertz, limits_said, only, with_unit
+from paper_figures.look.captions import actuator_said, hertz, only, with_unit
 from paper_figures.look.style import FULL_WIDTH, LINES, figure, styled
 
 TABLES: tuple[str, ...] = ("rates",)
@@ -33,15 +33,21 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
     table, signals = tables["rates"], design.signals
     band = with_unit(SETTLED * only(table, "amplitude"), signals.output_unit)
     said = ", ".join(_said(table, method, words) for method, (words, _) in METHODS.items())
+    near = (
+        " With the corrected anti-windup the error comes to stay within 1 % of the amplitude of that in continuous "
+        f"time by {said}."
+    )
+    if not continuous_error(table, "corrected") <= FOLLOWED * only(table, "amplitude"):
+        near = ""
     levels = only(table, "quantum")
     steps = f" in steps of {with_unit(levels, signals.input_unit)}" if levels else ""
     return (
-        f"The controller on a computer, under the limits {limits_said(table, signals.input_unit)}{steps}: the greatest "
-        "error of the last period over the sampling rate. The controller is made again for samples ('matched', "
-        "triangles), or its blocks are discretised by Tustin's rule (circles) or as they answer an input that is held "
+        f"The controller on a computer, under the limits {actuator_said(table, signals.input_unit)}{steps}: the "
+        "greatest error of the last period over the sampling rate, at the samples or, of the linear loop, between "
+        "them. The controller is made again for samples ('matched', triangles), or its blocks are discretised by "
+        "Tustin's rule (circles) or as they answer an input that is held "
         f"for a sample (squares); broad, in continuous time; dotted, {band}, which is 1 % "
-        "of the reference's amplitude; less than a millionth of it is drawn as that. With the corrected anti-windup "
-        f"the error comes to stay within 1 % of the amplitude of that in continuous time by {said}.{_divergent(table)}"
+        f"of the reference's amplitude; less than a millionth of it is drawn as that.{near}{_divergent(table)}"
     )
 
 
@@ -52,11 +58,30 @@ def _said(table: pd.DataFrame, method: str, words: str) -> str:
 
 
 def _divergent(table: pd.DataFrame) -> str:
-    """Which of the runs on a computer are not there because they diverge."""
-    gone = table[table["steady_error"].isna() & table["rate_hz"].notna()]
-    rows = ((str(row.run), str(row.method), float(str(row.rate_hz))) for row in gone.itertuples())
-    said = [f"{KINDS.get(run, run)}, {METHODS[method][0]}, {hertz(rate)}" for run, method, rate in rows]
-    return f" Not drawn, since it diverges: {'; '.join(said)}." if said else ""
+    """Which of the runs on a computer are not there, and why."""
+    shown = table[table["run"].isin(RUNS) & table["rate_hz"].notna()]
+    unstable = shown[(shown["stable"] == 0) & (shown["run"] == RUNS[0])]
+    most = [
+        f"{METHODS[str(method)][0]} up to {hertz(rows.max())}" for method, rows in unstable.groupby("method")["rate_hz"]
+    ]
+    said = (
+        [f" No run is made where the linear loop is unstable: {', '.join(most)}, but for the computer's rate."]
+        if most
+        else []
+    )
+    still = [KINDS[run] for run in RUNS if not continuous_error(table, run) <= FOLLOWED * only(table, "amplitude")]
+    if still:
+        said.append(f" In continuous time the loop does not follow, and no rates are tried: {', '.join(still)}.")
+    runs = shown[
+        shown["steady_error"].isna()
+        & (shown["stable"] == 1)
+        & ~shown["run"].isin([r for r in RUNS if KINDS[r] in still])
+    ]
+    rows = ((str(row.run), str(row.method), float(str(row.rate_hz))) for row in runs.itertuples())
+    gone = [f"{KINDS.get(run, run)}, {METHODS[method][0]}, {hertz(rate)}" for run, method, rate in rows]
+    if gone:
+        said.append(f" Not drawn, since it diverges: {'; '.join(gone)}.")
+    return "".join(said)
 
 
 @styled()
@@ -101,7 +126,7 @@ def over_rate(panel: Axes, table: pd.DataFrame, runs: Sequence[str]) -> None:
     for order, run in enumerate(runs):
         line = LINES[look_of(run)]
         own = table[table["run"] == run]
-        panel.plot(ends, [float(own["steady_error"][own["method"] == CONTINUOUS].iloc[0])] * 2, **panels.band(line))
+        panel.plot(ends, [continuous_error(table, run)] * 2, **panels.band(line))
         for method, (_, marker) in known.items():
             rows = own[own["method"] == method]
             face = "#FFFFFF" if method == "exact" else line["color"]

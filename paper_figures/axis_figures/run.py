@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from design.design_file import Design
 from experiments.drive.sampled_loop import SampledRun
 from paper_figures.axis_figures.labels import KINDS
-from paper_figures.look.captions import capitalised, duration, last_saturated, limits_said, of_run, only, with_unit
+from paper_figures.look.captions import actuator_said, capitalised, duration, last_saturated, of_run, only, with_unit
 from paper_figures.look.plot_run import plot_run
 
 TABLES: tuple[str, ...] = ("tracking", "tracking_summary")
@@ -25,8 +25,8 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
     summary, signals = tables["tracking_summary"], design.signals
     said = ". ".join(_said(summary, str(run), signals.output_unit) for run in summary["run"])
     return (
-        f"The reference from rest under the limits {limits_said(summary, signals.input_unit)}: output, error, and the "
-        f"control that is asked for with what the actuator gives out; shaded, where it is at a limit. {said}."
+        f"The reference from rest under the limits {actuator_said(summary, signals.input_unit)}: output, error, and "
+        f"the control that is asked for with what the actuator gives out; shaded, where it is at a limit. {said}."
     )
 
 

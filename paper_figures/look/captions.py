@@ -95,6 +95,17 @@ def limits_said(table: pd.DataFrame, unit: str) -> str:
     return f"{of_limits(table)} {unit}".rstrip()
 
 
+def a_second(rate_limit: float, unit: str) -> str:
+    """A rate limit in words, ``2000 A/s``."""
+    return f"{number(rate_limit)} {unit}/s" if unit else f"{number(rate_limit)} a second"
+
+
+def actuator_said(table: pd.DataFrame, unit: str) -> str:
+    """The limits of a table in words and, if there is one, its rate limit."""
+    rate_limit, limits = only(table, "rate_limit"), limits_said(table, unit)
+    return limits if math.isnan(rate_limit) else f"{limits} and the rate limit {a_second(rate_limit, unit)}"
+
+
 def of_run(summary: pd.DataFrame, run: str, column: str) -> float:
     """Return the value of a column in the row of a run.
 

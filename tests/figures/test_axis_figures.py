@@ -60,7 +60,7 @@ def made_up() -> Tables:
     start = np.arange(0.0, 12.0, 0.5)
     rest = {"start_s": start, "rest_lower": 4 / (1 + start) ** 3, "rest_upper": 4.1 / (1 + start) ** 3}
     rest |= {f"tail_{run}": k / (1 + start) ** 2 for run, k in (("none", 9.0), ("corrected", 6.0))}
-    facts = {"lower_limit": LIMITS[0], "limit": LIMITS[1]}
+    facts = {"lower_limit": LIMITS[0], "limit": LIMITS[1], "rate_limit": 40.0}
     settling = {"settling_upper_s": [2.5], "settling_none_s": [np.nan], "settling_corrected_s": [7.5]}
     share = np.linspace(0.1, 1.0, 10)
     runs = ("none", "thesis", "corrected")
@@ -130,7 +130,8 @@ def test_the_rates_are_those_of_the_table_and_the_caption_says_from_where_on(des
     table = tables["rates"]
     rows = table[(table["run"] == "corrected") & (table["method"] == "exact")]
     assert any(
-        np.array_equal(line.get_xdata(), rows["rate_hz"]) and np.allclose(line.get_ydata(), rows["steady_error"])
+        np.array_equal(line.get_xdata(), rows["rate_hz"])
+        and np.allclose(line.get_ydata(), rows["steady_error"], equal_nan=True)
         for line in panel.lines
     )
     assert 30.0 in set(rows["rate_hz"])
@@ -178,5 +179,9 @@ def test_a_forced_error_is_in_the_view_of_the_limits(design: Design, tables: Tab
 
 def test_a_campaign_says_what_became_of_the_plants(design: Design, tables: Tables) -> None:
     _, caption = drawn("campaign", design, tables)
-    for part in ("40 plants drawn within W_a (seed 3)", "limits -5 to 9 mA, for 21 s", "period's error is 0.05 cm"):
+    for part in (
+        "40 plants drawn within W_a (seed 3)",
+        "limits -5 to 9 mA and the rate limit 40 mA/s, for 21 s",
+        "period's error is 0.05 cm",
+    ):
         assert part in caption

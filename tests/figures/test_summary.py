@@ -38,18 +38,25 @@ NAN = np.nan
 def tracking(limits: tuple[float, float] = (-6.5, 6.5), steady: float = 4.25, last: float = 3.125) -> pd.DataFrame:
     rows = [
         {"run": run, "last_saturation_s": last, "offset": offset, "ripple": 0.125, "relative_error_percent": 1.5}
-        | {"asked_control": 12.5, "covered_control": 17.25, "largest_control": 12.75, "covered": 1}
+        | {
+            "slews": 0,
+            "recovery_s": last,
+            "rate_limit": NAN,
+            "asked_control": 12.5,
+            "covered_control": 17.25,
+            "largest_control": 12.75,
+            "covered": 1,
+        }
         for run, offset in (("none", 0.75), ("corrected", 0.0))
     ]
     facts = {"lower_limit": limits[0], "limit": limits[1], "steady_least": -steady, "steady_greatest": steady}
     return pd.DataFrame(rows).assign(**facts, linear_control=9.5, span_s=4.0)
 
 
-def compared(none: float = 2.5, corrected: float = 1.25) -> pd.DataFrame:
-    times = {"none": none, "corrected": corrected}
-    return pd.DataFrame(
-        [{"run": run, "upset": upset, "recovery_s": times[run]} for upset in ("start", "pulse") for run in times]
-    )
+def compared(none: float = 2.5, corrected: float = 1.25, enough: float = 1.0, **others: float) -> pd.DataFrame:
+    times = {"none": none, "corrected": corrected} | others
+    rows = [{"run": run, "upset": upset, "recovery_s": times[run]} for upset in ("start", "pulse") for run in times]
+    return pd.DataFrame(rows).assign(enough=enough, rate_limit=NAN, refused=NAN, guarantee="sector 0.9")
 
 
 def rates(asked: float = NAN, **errors: list[float]) -> pd.DataFrame:
@@ -62,7 +69,7 @@ def rates(asked: float = NAN, **errors: list[float]) -> pd.DataFrame:
         for method, of_method in every.items()
         for rate, error in zip((100.0, 200.0, 400.0), of_method, strict=True)
     ]
-    return pd.DataFrame(rows).assign(asked_hz=asked, amplitude=10.0, quantum=0.0)
+    return pd.DataFrame(rows).assign(asked_hz=asked, amplitude=10.0, quantum=0.0, rate_limit=NAN, unslewed_error=NAN)
 
 
 RUNS = ("none", "corrected")
@@ -427,3 +434,28 @@ def test_panels_show_tests_model_and_bound():
     letters = [text.get_text() for panel in (magnitude, phase, figure.axes[1], relative) for text in panel.texts]
     assert letters == ["(a)", "(b)", "(c)", "(d)"]
     assert all(a < b for a, b in pairwise(letters))
+
+
+def test_the_anti_windup_is_the_one_whose_run_recovers():
+    found = found_of(compare=compared(NAN, NAN, static=1.5, observer=2.5))
+    said = advised(found)
+    assert "'static' (--anti-windup static): from rest it recovers after 1.5 s" in said["Do"]
+    assert "Do not use 'corrected', with which the loop does not recover from rest." in said["Avoid"]
+    nothing = advised(found_of(compare=compared(NAN, NAN, enough=4.0)))["Do"]
+    assert "With a reference 4 times smaller, or limits 4 times wider, one does" in nothing
+    assert "suffice in the steady state" in nothing
+    assert "Run it on a computer" not in nothing
+
+
+def test_a_rate_limit_that_acts_leaves_no_guarantee_and_is_blamed_for_what_stays():
+    slow = tracking().assign(rate_limit=30.0, slews=1)
+    said = advised(found_of(tracking=slow))["Do"]
+    assert "held back by its rate limit of 30 mA/s in this run, and a guarantee is of limits alone" in said
+    assert "guaranteed to return" not in said
+    never = advised(found_of(tracking=slow.assign(slews=0)))["Do"]
+    assert "guaranteed to return" in never
+    assert "The rate limit of 30 mA/s is never reached in the run" in never
+    table = rates(200.0, matched=[0.01, 5.0, 0.01]).assign(rate_limit=30.0)
+    table["unslewed_error"] = table["unslewed_error"].where(table["rate_hz"] != 200.0, 0.015)
+    avoided = advised(found_of(rates=table))["Avoid"]
+    assert "because of the rate limit of 30 mA/s the loop does not come to rest, and an error of 5 cm stays" in avoided

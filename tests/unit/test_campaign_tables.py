@@ -17,7 +17,7 @@ from experiments.campaign.distributions import campaign_tables
 from experiments.campaign.seal import SEAL, Seal
 from identification.base.errors import InputError
 
-FACTS = {"plants": "40", "seed": "7", "lower_limit": "-10", "limit": "12.5", "horizon_s": "25"}
+FACTS = {"plants": "40", "seed": "7", "lower_limit": "-10", "limit": "12.5", "rate_limit": "300", "horizon_s": "25"}
 NEVER = {"peak_error": np.nan, "steady_error": np.nan, "recovery_s": np.nan}
 
 

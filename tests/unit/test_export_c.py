@@ -135,9 +135,27 @@ def test_what_no_float_holds_and_what_no_int_counts_to_is_refused(extended_desig
     controller = sampled_controller(extended_design, "corrected", (-1e39, 1e39), 2000.0, "tustin", "axis")
     with pytest.raises(InputError, match=r"number -1e\+39, which no float holds"):
         c_code.files(controller, check_run(extended_design, controller), "float")
+    controller = dataclasses.replace(controller, limits=(-1e-50, 1.0))
+    with pytest.raises(InputError, match="limit -1e-50, which no float holds"):
+        c_code.files(controller, check_run(extended_design, controller), "float")
+    vanishing = dataclasses.replace(
+        controller, limits=(-1.0, 1.0), forward=controller.forward._replace(b=controller.forward.b * 1e-60)
+    )
+    vanishing = dataclasses.replace(vanishing, forward=vanishing.forward._replace(C=controller.forward.C * 1e60))
+    with pytest.raises(InputError, match=r"which no float holds|in floats the controller is another"):
+        c_code.files(vanishing, check_run(extended_design, vanishing), "float")
     slow = dataclasses.replace(extended_design, plant=dataclasses.replace(extended_design.plant, delay_s=0.4))
     with pytest.raises(InputError, match="the dead time is 40000 samples long; expected at most 32760"):
         sampled_controller(slow, "corrected", (-1.0, 1.0), 1e5, "tustin", "axis")
+
+
+def test_limits_that_no_run_reaches_leave_a_test_within_them(extended_design: Design) -> None:
+    """With one such limit the test goes beyond the other."""
+    for limits, saturates in (((-1e300, 1e300), False), ((-math.inf, math.inf), False), ((-1e300, 2.0), True)):
+        controller = sampled_controller(extended_design, "corrected", limits, 2000.0, "tustin", "axis")
+        run = check_run(extended_design, controller)
+        assert run.saturates == saturates
+        assert run.saturates == (run.control.max() > limits[1])
 
 
 # The start
