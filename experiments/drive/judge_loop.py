@@ -160,8 +160,8 @@ class _Loop:
             g *= (w - anchor) * self.T / z
         for pole in self.poles:
             own *= 1 - pole / z
-        controlled = own * response(self.forward, z) * self.plant(w) * (self.T / z) ** len(self.anchors)
-        rest = (1 - response(self.feedback, z)) * g * own
+        controlled = own * _response(self.forward, z) * self.plant(w) * (self.T / z) ** len(self.anchors)
+        rest = (1 - _response(self.feedback, z)) * g * own
         return rest + controlled * z**-self.samples, rest
 
     def errors(self, omega: float) -> tuple[float, float]:
@@ -226,7 +226,7 @@ class _Loop:
         return np.unique(every[(every >= lowest) & (every <= math.pi)])
 
 
-def response(block: SampledBlock, z: Complex) -> Complex:
+def _response(block: SampledBlock, z: Complex) -> Complex:
     """The sum of a block's outputs over its input at points (k,) of the unit circle."""
     n = len(block.b)
     states = np.linalg.solve(z[:, None, None] * np.eye(n) - block.A, np.broadcast_to(block.b[:, None], (len(z), n, 1)))
