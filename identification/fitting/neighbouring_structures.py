@@ -30,7 +30,7 @@ STEPS = (
     *((0, -2, 0, -2), (0, -1, 0, -1), (0, -2, 0, 0), (0, 0, 0, -2), (0, -1, 0, 0), (0, 0, 0, -1)),
     *((0, 0, -1, 0), (0, 0, -2, 0), *ALL_PASSES),
     *((-1, -1, 0, 0), (1, 0, 0, -1), (-1, 0, 0, 1), (1, 1, 0, 0), (-2, -2, 0, 0), (2, 0, 0, -2)),
-    *((0, 0, 0, 1), (0, 1, 0, 0), (0, 1, 0, 1)),
+    *((0, 0, 0, 1), (0, 1, 0, 0), (0, 1, 0, 1), (0, 0, 1, 0)),
 )
 """Integrators, left zeros, right zeros and poles that a step adds: fewer roots, s = 0 for a slow root, more roots."""
 FLIPS = ((0, -1, 1, 0), (0, -2, 2, 0), (0, 1, -1, 0), (0, 2, -2, 0))
@@ -40,7 +40,8 @@ FLIPS = ((0, -1, 1, 0), (0, -2, 2, 0), (0, 1, -1, 0), (0, 2, -2, 0))
 def neighbours(structure: Structure) -> list[Structure]:
     """The structures one step away: those of STEPS and FLIPS, and the one without or with a dead time.
 
-    A zero on the right and a pole may be what a dead time looks like: they may go for one.
+    A zero on the right and a pole may be what a dead time looks like: they may go for one. A dead time may be what a
+    zero on the right looks like: one more such takes the place of all or half of it.
     """
     near = [*stepped(structure, (*STEPS, *FLIPS)), replace(structure, delayed=not structure.delayed)]
     if not structure.delayed:
@@ -67,7 +68,11 @@ def reached_from(fit: Likely, target: Structure, omega: Real) -> list[Real]:
     elif changes[1] < 0 < changes[0]:
         found = [(left, right, sides[2]) for right, left in _mirrored(sides[1], sides[0], changes[0])]
     else:
-        lefts, rights, poles = (_changed(side, change, omega) for side, change in zip(sides, changes, strict=True))
+        places = [omega[0] / BAND, np.sqrt(omega[0] * omega[-1]), omega[-1] * BAND]
+        lag = fit.theta[-1]
+        late = [1 / lag, 2 / lag] if lag * omega[-1] * BAND > 1 else []  # zeros that lag as all or half of the delay
+        lefts, poles = (_changed(sides[k], changes[k], places) for k in (0, 2))
+        rights = _changed(sides[1], changes[1], [*places, *late])
         found = list(product(lefts, rights, poles))
     starts = []
     for there in found:
@@ -116,16 +121,15 @@ def _mirrored(source: Side, goal: Side, count: int) -> Iterator[tuple[Side, Side
                 yield kept, _with_root(*goal, log_omega + shift)
 
 
-def _changed(side: Side, change: int, omega: Real) -> list[Side]:
-    """The polynomials with ``change`` roots more that are worth a try."""
+def _changed(side: Side, change: int, places: Sequence[float]) -> list[Side]:
+    """The polynomials with ``change`` roots more that are worth a try; one more at each of ``places``."""
     modes, rates = side
     if change == 0:
         return [side]
     if change == -2:
         return [(np.delete(modes, i, axis=0), rates) for i in range(len(modes))]
     if change == 1:
-        places = np.log([omega[0] / BAND, np.sqrt(omega[0] * omega[-1]), omega[-1] * BAND])
-        return [_with_root(modes, rates, place) for place in places]
+        return [_with_root(modes, rates, float(np.log(place))) for place in places]
     found: list[Side] = [(modes, rates[:0])] if rates.size else []
     for i, (log_omega, log_zeta) in enumerate(modes):
         others = np.delete(modes, i, axis=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,8 +16,10 @@ from identification.fitting.neighbouring_structures import OUTSIDE
 from identification.fitting.structure_fits import ALIKE, RUN
 from identification.model.parameter import Parameter
 from identification.model.plant import PlantModel
+from identification.model.structure import MOST_REAL, Structure
 from identification.sweeps.response import FrequencyResponse
 
+MISSED = 0.6  # correlation of neighbouring residuals that a ripple hardly reaches
 POOR = 0.15  # median distance of a test from its own fit
 WORSE = 3.0  # times the distance of a test from its own fit
 AT_EDGE = 0.02  # of the search, a logarithm
@@ -67,11 +70,23 @@ def _misfit(result: FitResult) -> Iterator[str]:
     own, nominal = max(test.distance for test in result.tests), max(result.distances)
     if own > POOR and max(test.relative for test in result.tests) > POOR:
         yield f"a median distance of {percent(own)} % is more than noise leaves on a plant of this class"
+    correlation = max(test.correlation for test in result.tests)
+    if result.nominal.misfit.any() and correlation > MISSED:
+        yield f"the search may have missed a root: {_one_zero_more(result.structure)}"
     if nominal > POOR and nominal > WORSE * own:
         yield (
             f"the plant is the mean of plants that differ much: it misses a test by {percent(nominal)} %, whose own "
             f"fit misses it by {percent(own)} % at most; the tests hardly are of one plant"
         )
+
+
+def _one_zero_more(structure: Structure) -> str:
+    """The options that ask for one real zero more, and for one pole more if that would be improper."""
+    (zero_modes, pole_modes), (zeros, poles) = structure.modes, structure.real
+    poles += not replace(structure, zeros=structure.zeros + 1).proper
+    if max(zeros + 1, poles) > MOST_REAL:
+        return f"try other --modes than {zero_modes}/{pole_modes}"
+    return f"try --modes {zero_modes}/{pole_modes} --real {zeros + 1}/{poles}"
 
 
 def _edges(plant: PlantModel, omega: Real) -> dict[str, str]:

@@ -8,8 +8,11 @@ import pytest
 from identification.fitting.least_squares import response_of
 from identification.fitting.likelihood import Likely
 from identification.fitting.neighbouring_structures import neighbours, reached_from, within_band
+from identification.fitting.single_test_fit import ScaledTest
+from identification.fitting.structure_fits import StructureFits
 from identification.model.plant_json import shaped
 from identification.model.structure import Structure, Wanted
+from identification.sweeps.response import FrequencyResponse
 
 OMEGA = np.geomspace(0.3, 3.0, 40)
 
@@ -91,6 +94,25 @@ def test_roots_far_outside_the_band_are_left_out() -> None:
     np.testing.assert_allclose(left[1], [0.0, 0.2, -2.0, 0.1])
     inside = np.array([0.0, 0.2, -2.0, 0.1])
     assert within_band(Likely(Structure(2, 0, 2), inside, 1.0, 0.1, 0.1, 0.0), OMEGA, 2.5) is None
+
+
+def test_a_dead_time_is_given_up_for_a_zero_on_the_right() -> None:
+    """SYNTHETIC: two real poles and a dead time miss the plant; the step to a zero at 40 rad/s leaves noise."""
+    omega = np.geomspace(0.6, 600.0, 60)
+    exact = 2 * (1 - 1j * omega / 40) / ((1 + 1j * omega / 5) * (1 + 1j * omega / 100)) * np.exp(-0.002j * omega)
+    noise = np.random.default_rng(3).standard_normal((60, 2)) @ [1, 1j] / np.sqrt(2)
+    test = ScaledTest(FrequencyResponse(omega, exact * (1 + 0.02 * noise), None, "one"), soft=False)
+    fits = StructureFits([test], Wanted(), lambda: None)
+    without, with_zero = Structure(0, 0, 2), Structure(0, 0, 2, right=1)
+    fits.fit(without, None)
+    assert test.distance(fits.fits[without][0]) > 0.1
+    assert with_zero in neighbours(without)
+    assert fits.step(without, with_zero)
+    found = fits.fits[with_zero][0]
+    assert test.distance(found) < 0.02
+    plant = with_zero.plant(test.to_physical(with_zero, found.theta), found.sign)
+    assert plant.real_zeros[0] == pytest.approx(-40, rel=0.02)
+    assert plant.delay_s == pytest.approx(0.002, rel=0.05)
 
 
 def test_what_is_wanted() -> None:
