@@ -187,7 +187,7 @@ class _Loop:
     def control(self, theta: float) -> complex:
         """The control of a reference exp(j k theta), where neither the plant nor the controller has a pole."""
         z, w = np.exp(1j * np.array([theta])), np.expm1(1j * np.array([theta])) / self.T
-        forward, rest = response(self.forward, z), 1 - response(self.feedback, z)
+        forward, rest = _response(self.forward, z), 1 - _response(self.feedback, z)
         return complex((forward / (rest + forward * self.sampled(w) * z**-self.samples))[0])
 
     def stability(self) -> tuple[bool, float]:
