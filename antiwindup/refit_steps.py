@@ -76,7 +76,7 @@ def _figures(folder: Path) -> list[Step]:
     return [
         Step(
             f"figure {name}",
-            ("paper_figures", "axis", name, "--build", str(folder), "--output", str(folder / "figures")),
+            ("paper_figures", "axis", name, "--refit", str(folder), "--output", str(folder / "figures")),
             pictures(folder / "figures" / name),
             (folder / "design.json", *csv_files(folder, *tables)),
         )

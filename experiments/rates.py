@@ -12,7 +12,6 @@ import pandas as pd
 
 from design.blocks.block import fastest_root
 from design.design_file import Design
-from experiments.drive.between_samples import error_between
 from experiments.drive.judge_loop import judge_loop
 from experiments.drive.sampled_loop import METHODS, Drive, simulate_sampled
 from experiments.runs.compare_anti_windups import SETTLED, anti_windups, loops, run_all, span, usual_periods
@@ -76,9 +75,9 @@ def rates_tables(
         ``rates``, see :func:`rows_of`, of NAMES and, at ``rate`` alone, of every anti-windup that there is. A run is
         made where its linear loop is stable (stable 1, else 0, see :func:`experiments.drive.judge_loop.judge_loop`) and
         follows in continuous time, and at ``rate``; steady_error, empty of what is not run, is no less than that of the
-        linear loop between the samples, see :func:`experiments.drive.between_samples.error_between`. unslewed_error is
-        that of the run without the rate limit, at ``rate``. In every row: asked_hz (empty: none), amplitude (of the
-        reference), quantum, lower_limit, limit (the upper one), and rate_limit (empty: none).
+        linear loop between the samples. unslewed_error is that of the run without the rate limit, at ``rate``. In every
+        row: asked_hz (empty: none), amplitude (of the reference), quantum, lower_limit, limit (the upper one), and
+        rate_limit (empty: none).
     """
     period, low_high = span(design, reference), dict(zip(("lower_limit", "limit"), limits, strict=True))
     count = usual_periods(design, reference)
@@ -119,10 +118,9 @@ def rates_tables(
 
 
 def _linear(design: Design, drive: Drive, reference: Reference) -> float:
-    """The error of the linear loop between the samples, infinite where it is not stable."""
-    if not judge_loop(design, drive, omegas=reference.frequencies).stable:
-        return math.inf
-    return error_between(design, drive, reference.amplitudes, reference.omegas)
+    """The most that the error of the linear loop reaches between the samples, infinite where it is not stable."""
+    judged = judge_loop(design, drive, omegas=reference.omegas)
+    return float(np.abs(reference.amplitudes) @ judged.between_errors) / 100 if judged.stable else math.inf
 
 
 def rows_of(

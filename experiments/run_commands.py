@@ -245,10 +245,9 @@ def sampled_command(
         from paper_figures.look.plot_run import plot_run
         from paper_figures.look.style import figure_writer
 
-        drawn = plot_run({anti_windup: run}, drive.limits, content.signals)
-        if "the linear loop is UNSTABLE" in judgement:
-            drawn.suptitle(f"UNSTABLE at {rate:g} Hz with the method {drive.method}")
-        writers[figure] = figure_writer(drawn)
+        is_unstable = "the linear loop is UNSTABLE" in judgement
+        title = f"The linear loop is UNSTABLE at {rate:g} Hz with the method {drive.method}" if is_unstable else ""
+        writers[figure] = figure_writer(plot_run({anti_windup: run}, drive.limits, content.signals, title))
     write_whole(writers, inputs)
     click.echo(_first(promised, f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}"))
 

@@ -50,25 +50,25 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
 @main.command("axis")
 @click.argument("names", metavar="NAME...", nargs=-1, required=True)
 @click.option(
-    "--build",
+    "--refit",
     type=INPUT,
     required=True,
     help="Folder of design.json, with the tables in its folder results.",
 )
 @click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write to.")
-def axis_command(names: tuple[str, ...], build: Path, output: Path) -> None:
+def axis_command(names: tuple[str, ...], refit: Path, output: Path) -> None:
     """Draw NAME..., such as run or rates, of a refit: each as PDF, SVG and PNG with its caption as text."""
     from design.design_file import read_design
     from paper_figures.axis_figures.registry import axis_figure
     from paper_figures.look import style
     from paper_figures.result_tables import read_table, sentences_of
 
-    design = read_design(build / "design.json", "extended")
+    design = read_design(refit / "design.json", "extended")
     files: dict[Path, bytes] = {}
     for name in names:
         module = axis_figure(name)
-        tables = {table: read_table(build / "results" / f"{table}.csv", name) for table in module.TABLES}
-        with sentences_of(tables, build / "results", name, build / "design.json"):
+        tables = {table: read_table(refit / "results" / f"{table}.csv", name) for table in module.TABLES}
+        with sentences_of(tables, refit / "results", name, refit / "design.json"):
             files |= style.rendered(module.draw(design, tables), output, name, module.caption(design, tables))
     style.write(files)
 

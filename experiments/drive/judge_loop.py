@@ -160,8 +160,8 @@ class _Loop:
             g *= (w - anchor) * self.T / z
         for pole in self.poles:
             own *= 1 - pole / z
-        controlled = own * response(self.forward, z) * self.plant(w) * (self.T / z) ** len(self.anchors)
-        rest = (1 - response(self.feedback, z)) * g * own
+        controlled = own * _response(self.forward, z) * self.plant(w) * (self.T / z) ** len(self.anchors)
+        rest = (1 - _response(self.feedback, z)) * g * own
         return rest + controlled * z**-self.samples, rest
 
     def errors(self, omega: float) -> tuple[float, float]:
@@ -187,7 +187,7 @@ class _Loop:
     def control(self, theta: float) -> complex:
         """The control of a reference exp(j k theta), where neither the plant nor the controller has a pole."""
         z, w = np.exp(1j * np.array([theta])), np.expm1(1j * np.array([theta])) / self.T
-        forward, rest = response(self.forward, z), 1 - response(self.feedback, z)
+        forward, rest = _response(self.forward, z), 1 - _response(self.feedback, z)
         return complex((forward / (rest + forward * self.sampled(w) * z**-self.samples))[0])
 
     def stability(self) -> tuple[bool, float]:
@@ -226,7 +226,7 @@ class _Loop:
         return np.unique(every[(every >= lowest) & (every <= math.pi)])
 
 
-def response(block: SampledBlock, z: Complex) -> Complex:
+def _response(block: SampledBlock, z: Complex) -> Complex:
     """The sum of a block's outputs over its input at points (k,) of the unit circle."""
     n = len(block.b)
     states = np.linalg.solve(z[:, None, None] * np.eye(n) - block.A, np.broadcast_to(block.b[:, None], (len(z), n, 1)))

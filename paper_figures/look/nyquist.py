@@ -60,7 +60,7 @@ def plot_nyquist(design: Design, plant: PlantModel | None = None) -> Figure:
     Figure
         See :func:`draw_nyquist`.
     """
-    figure = Figure(figsize=(4.6, 4.9), layout="constrained")
+    figure = Figure(figsize=(4.6, 5.2), layout="constrained")
     draw_nyquist(figure.subplots(), design, plant)
     return figure
 

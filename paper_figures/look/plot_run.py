@@ -48,6 +48,7 @@ def plot_run(
     runs: AnyRun | Mapping[str, AnyRun],
     limits: float | Sequence[float] | None = None,
     signals: Signals = UNNAMED,
+    title: str = "",
 ) -> Figure:
     """Draw a run, or several of one reference one upon the other.
 
@@ -60,6 +61,8 @@ def plot_run(
         them is shaded. Neither unless given.
     signals
         Names and units of the plant's input and output; those of a design are ``design.signals``.
+    title
+        What stands above all.
 
     Returns
     -------
@@ -99,6 +102,8 @@ def plot_run(
     for panel in panels:
         panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.7g}"))
     panel_letters(panels)
+    if title:
+        figure.suptitle(title)
     figure.align_ylabels()
     return figure
 
