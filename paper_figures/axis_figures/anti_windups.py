@@ -54,7 +54,8 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
         "from that of the loop without limits, over the reference's amplitude; dotted, 1 %, which counts as recovered. "
         "(c), (d) The recovery time and the greatest control asked for, over the larger limit. A full marker: recovery "
         "is guaranteed whatever the control; a half one: as long as the control stays within a bound; an open one: "
-        f"nothing is guaranteed. Recovery from rest and after the disturbance: {said}.{physical}"
+        "nothing is guaranteed. Markers at one place lie around each other. Recovery from rest and after the "
+        f"disturbance: {said}.{physical}"
     )
 
 

@@ -358,9 +358,7 @@ def test_usual_limits(delay_free_design: Design, monkeypatch: pytest.MonkeyPatch
 def test_command_line(extended_design: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
-    def found(
-        design: Design, reference: Reference, limits: Sequence[float], tick: object, names: object = None
-    ) -> dict[str, pd.DataFrame]:
+    def found(design: Design, reference: Reference, limits: Sequence[float], *_: object) -> dict[str, pd.DataFrame]:
         asked.append((design.kind, reference, limits))
         return {"limits_extended": pd.DataFrame({"limit": [2.0]}), "limits_extended_summary": pd.DataFrame({"a": [1]})}
 
