@@ -27,7 +27,7 @@ _run_options = together(
     LIMIT_PAIR,
     click.option(
         "--anti-windup",
-        required=True,
+        default="corrected",
         help="none, thesis, corrected, another of DESIGN, or one of others: see the README.",
     ),
     click.option("--until", type=float, required=True, help="Length of the run in seconds."),
