@@ -67,7 +67,7 @@ def use_not(found: Found, signals: Signals) -> Iterator[str]:
     others = [run for run in times if run != "none" and not (run == "corrected" and said)]
     for place, upset in enumerate(("from rest", "after the disturbance of the comparison")):
         gone = [
-            "'thesis' (second order, Eq. (2.23))" if run == "thesis" else f"'{run}'"
+            "the second-order one of Eq. (2.23)" if run == "thesis" else f"'{run}'"
             for run in others
             if _fails_first(times[run]) == place
         ]
