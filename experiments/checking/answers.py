@@ -149,7 +149,7 @@ def _parameters(found: ModelCheck, sweep: SweepCheck) -> tuple[Outcome, str]:
     share, record = found.share, found.model.fit
     if sweep.moves is None or record is None:
         return Outcome.OPEN, "the model does not say how sure its parameters are, so that only W_a was compared"
-    largest = sorted(sweep.moves, key=lambda move: move.chance)
+    largest = sorted(sweep.moves, key=lambda move: (move.chance, -abs(move.errors)))
     moved = [move for move in largest if move.chance < share]
     untold = sum(not move.could_be_told for move in sweep.moves)
     new = ""
@@ -174,6 +174,7 @@ def _parameters(found: ModelCheck, sweep: SweepCheck) -> tuple[Outcome, str]:
         return Outcome.OPEN, f"{tests} too few to tell whether a parameter moved: {words}"
     none = "no parameter moved by more than chance"
     none += f"; {named(first.parameter)}, which differs {_by(first)}, comes nearest to a move"
+    none += f", told from {found_from(first)} on" if first.could_be_told else ""
     rest = [f"of {untold} of the {len(sweep.moves)} parameters no move could be told"] if untold else []
     return Outcome.MOVED if new else Outcome.HOLDS, "; ".join([*([new] if new else []), none, *rest])
 

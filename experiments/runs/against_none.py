@@ -133,20 +133,21 @@ def against_none(
         The loop cannot be simulated, or one period of the reference takes too many steps.
     """
     plant, omegas = design.loop_plant, design.reference_omegas
-    asked, conditions = "the reference", ", from rest"
+    asked, crest = "the reference", ""
     if reference is None:
         asked = "a reference of amplitude 1" + (" at each of its frequencies" if len(omegas) > 1 else "")
-        conditions += f" under {asked}" + (", which begins at its crest" if any(omegas) else "")
+        crest = ", which begins at its crest" if any(omegas) else ""
         reference = Reference((1.0,) * len(omegas), omegas, (math.pi / 2,) * len(omegas), 0.0)
     until, period = _length(design, reference)
     times = np.linspace(0.0, until, SAMPLES)
     free = simulate(design_loop(design, reference, None), (-math.inf, math.inf), times)
+    conditions = f", from rest under {asked}{crest}"
     if limits is None:
         needed = reference.required(plant).at_most
         steady = 0 < needed < math.inf
         limits = limit_pair(ROOM * needed if steady else float(np.abs(free.control).max()) / 2)
-        whose = f"{ROOM:g} times what {asked} takes" if steady else "half of what the loop without limits asks for"
-        conditions = f", {whose}{conditions}"
+        whose = f"{ROOM:g} times what {asked} takes" if steady else f"half of what the loop asks for under {asked}"
+        conditions = f", {whose}, from rest under that reference{crest}"
     require_within_region(plant, reference, limits)
     outcomes = {
         name: _outcome(design_loop(design, reference, name), limits, free, reference, period)

@@ -14,6 +14,7 @@ from paper_figures.axis_figures.labels import KINDS
 from paper_figures.look.captions import (
     LITTLE,
     actuator_said,
+    capitalised,
     duration,
     is_rounding,
     last_saturated,
@@ -40,7 +41,7 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _said(summary: pd.DataFrame, run: str, unit: str) -> str:
-    words = KINDS.get(run, run).capitalize()
+    words = capitalised(KINDS.get(run, run))
     offset, ripple = (of_run(summary, run, column) for column in ("offset", "ripple"))
     if pd.isna(offset):
         return f"{words}: the run diverges"

@@ -102,7 +102,7 @@ def _limits(tracking: pd.DataFrame, best: pd.DataFrame | None, signals: Signals,
         used = f", {number(100 * share, 2)} % of the way to the nearer one" if share > 0 else ""
         unsaturated = only(tracking, "linear_control")
         acts = of_run(tracking, "none", "last_saturation_s") != 0
-        reached = f"on the way there the loop asks for up to {with_unit(unsaturated, unit)}, and they "
+        reached = f"in the run the loop without limits asks for up to {with_unit(unsaturated, unit)}, so that they "
         reached += "act" if acts else "never act"
         if follows:
             return f"The limits {within} suffice for this reference: {takes}{used}; {reached}."

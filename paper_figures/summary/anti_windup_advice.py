@@ -67,12 +67,12 @@ def use_not(found: Found, signals: Signals) -> Iterator[str]:
     others = [run for run in times if run != "none" and not (run == "corrected" and said)]
     for place, upset in enumerate(("from rest", "after the disturbance of the comparison")):
         gone = [
-            "the second-order one of Eq. (2.23)" if run == "thesis" else f"'{run}'"
+            "'second order, Eq. (2.23)'" if run == "thesis" else f"'{run}'"
             for run in others
             if _fails_first(times[run]) == place
         ]
         if gone and not math.isnan(times[str(best)][place]):
-            yield f"Do not use {_listed(gone)}, with which the loop does not recover {upset}."
+            yield f"Do not use the anti-windup {_listed(gone)}, with which the loop does not recover {upset}."
     yield from _without(str(best), found, signals)
 
 
@@ -139,6 +139,6 @@ def _within_limits(design: Design, tracking: pd.DataFrame | None, signals: Signa
     verdict = "no more" if of_run(tracking, "corrected", "covered") else "MORE, so nothing is guaranteed of this run"
     return (
         "the output is guaranteed to return to that of the loop without limits as long as "
-        f"{signals.input_name} asked for stays below {with_unit(covered, signals.input_unit)}; under this reference it "
-        f"reached {with_unit(reached, signals.input_unit)}, {verdict}"
+        f"the {signals.input_name} asked for stays below {with_unit(covered, signals.input_unit)}; under this "
+        f"reference it reached {with_unit(reached, signals.input_unit)}, {verdict}"
     )

@@ -25,6 +25,7 @@ from identification.model.plant import PlantModel
 from identification.model.signals import Signals
 from paper_figures.axis_figures.registry import NAMES, axis_figure
 from paper_figures.look.bode import plot_bode
+from paper_figures.look.captions import hertz
 from paper_figures.summary import page
 from paper_figures.summary.build_folder import Found
 from paper_figures.summary.words import summarise
@@ -151,6 +152,41 @@ def test_the_lowest_rate_is_the_one_from_which_on_all_are_near() -> None:
     assert lowest_rate(table, "corrected", "tustin") == 1600.0
     table.loc[table["rate_hz"] == 1600.0, "steady_error"] = np.nan
     assert np.isnan(lowest_rate(table, "corrected", "tustin"))
+
+
+def test_an_unstable_loop_has_no_steady_error(design: Design, tables: Tables) -> None:
+    rates = tables["rates"].copy()
+    unstable = (rates["method"] == "exact") & rates["rate_hz"].notna()
+    rates.loc[unstable, ["stable", "steady_error"]] = [0, 0.0973 * rates["amplitude"].iloc[0]]
+    figure, caption = drawn("rates", design, tables | {"rates": rates})
+    squares = [line for line in figure.axes[0].lines if line.get_marker() == "s"]
+    assert len(squares) > 1
+    assert np.isnan(np.concatenate([np.asarray(line.get_ydata(), float) for line in squares])).all()
+    assert f"the highest is {hertz(rates['rate_hz'].max())} (held inputs)" in caption
+
+
+def test_every_dot_of_the_comparison_is_within_its_panel_and_can_be_told(design: Design, tables: Tables) -> None:
+    same = tables["compare"].assign(recovery_s=6.7, largest_control=66.8, refused=np.nan)
+    figure, _ = drawn("anti_windups", design, tables | {"compare": same})
+    for panel in figure.axes[2:]:
+        dots = [line for line in panel.lines if len(line.get_xdata()) == 1]
+        assert len(dots) > 3
+        assert 0.95 * panel.get_ylim()[1] > 6.7
+        sizes = [dot.get_markersize() for dot in dots]
+        assert sizes == sorted(set(sizes), reverse=True), "what is behind is wider"
+
+
+def test_where_nothing_recovers_the_campaign_says_so(design: Design, tables: Tables) -> None:
+    campaign = tables["campaign"].copy()
+    campaign.loc[campaign["run"] != "thesis", "recovery_s"] = np.nan
+    figure, _ = drawn("campaign", design, tables | {"campaign": campaign})
+    assert "no run recovers" in [text.get_text() for text in figure.axes[2].texts]
+
+
+def test_a_forced_error_is_in_the_view_of_the_limits(design: Design, tables: Tables) -> None:
+    rest = tables["limits_extended_summary"].assign(rest_lower=0.363, rest_upper=0.364, tail_none=245.0)
+    figure, _ = drawn("limits", design, tables | {"limits_extended_summary": rest})
+    assert figure.axes[0].get_ylim()[0] < 0.363
 
 
 def test_a_campaign_says_what_became_of_the_plants(design: Design, tables: Tables) -> None:

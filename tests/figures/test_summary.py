@@ -152,13 +152,13 @@ def test_page_and_text_hold_the_same_cells(arguments):
 
 
 FULL_PAGE = """
-Level over valve current: plant with
+level over valve current: plant with
 SYNTHETIC DATA: 2 of 2 tests
 Do: Use the controller of design.json with the anti-windup 'corrected'
 stays below 17.2 mA; under this reference it reached 12.8 mA, no more.
 The limits +-6.5 mA suffice for this reference: in the steady state following the reference takes
--4.25 to 4.25 mA, 65 % of the way to the nearer one; on the way there
-the loop asks for up to 9.5 mA, and they act.
+-4.25 to 4.25 mA, 65 % of the way to the nearer one; in the run
+the loop without limits asks for up to 9.5 mA, so that they act.
 by the method 'matched' at 100 Hz or more
 Avoid: Do not leave the anti-windup out: without it an error of 0.875 cm is left at the end of the run, with
 Do not use Tustin's rule below 400 Hz: at 200 Hz the steady error is 0.125 cm.
@@ -197,8 +197,8 @@ CASES = {
         {"tracking": tracking(steady=8.125)},
         "Do",
         "Make the reference smaller to 80 % of its size, or widen the limits 1.25 times: the limits +-6.5 mA do NOT "
-        "suffice: in the steady state following the reference takes -8.12 to 8.12 mA, so that no controller follows it: each leaves an "
-        "error of 0.375 cm or more.",
+        "suffice: in the steady state following the reference takes -8.12 to 8.12 mA, so that no controller "
+        "follows it: each leaves an error of 0.375 cm or more.",
     ),
     "limits above 0": (
         {"tracking": tracking((0.5, 3.0), 2.5)},
@@ -208,7 +208,7 @@ CASES = {
     "limits that are never reached": (
         {"tracking": tracking(last=0.0)},
         "Do",
-        "the loop asks for up to 9.5 mA, and they never act.",
+        "asks for up to 9.5 mA, so that they never act.",
     ),
     "an anti-windup that does harm": (
         {"compare": compared(1.25, 2.5)},
@@ -265,8 +265,8 @@ def test_errors_of_rounding_are_not_compared():
 def test_a_reference_that_takes_no_steady_control_is_said_to_ask_for_what_the_run_did():
     said = advised(found_of(tracking=tracking(steady=0.0, last=0.0)))["Do"]
     assert (
-        "in the steady state following the reference takes 0 mA; on the way there the loop asks for up to 9.5 mA, and "
-        "they never act." in said
+        "in the steady state following the reference takes 0 mA; in the run the loop without limits asks for up to "
+        "9.5 mA, so that they never act." in said
     )
 
 
@@ -364,7 +364,11 @@ def test_what_the_fit_leaves_is_said():
         fit,
         tests=tuple(replace(test, median_distance=0.25) for test in fit.tests),
         misfit=fit.noise,
-        cautions=("a median distance of 25 % is more than noise leaves", "no dead time can be told from none"),
+        cautions=(
+            "a median distance of 25 % is more than noise leaves",
+            "no dead time can be told from none",
+            f"{tests[0].name}: the plant misses the line at 2 Hz",
+        ),
         agreement_of_tests=0.5,
         criterion=Criterion("BIC", 19.5, {fit.structure: 5.0}, fit.structure),
         checks={
@@ -378,7 +382,7 @@ def test_what_the_fit_leaves_is_said():
         "differ by no more: tests of one plant would differ as much with a probability of 0.5",
         "No other structure was tried. The deviance is divided by 19.5",
         "A median distance of 25 % is more than noise leaves.",
-        "No dead time can be told from none.",
+        f"No dead time can be told from none. {tests[0].name}: the plant misses",
         "the intervals are widened for it",
         "finds 2 of their 4 modes, omega within 2.5 % and zeta within 50 % of the fit.",
         "N4SID finds no pole of 20 rad/s (day_0.csv), pole of 20 rad/s (day_1.csv).",
@@ -490,7 +494,7 @@ def test_the_anti_windup_is_the_one_whose_run_recovers():
     found = found_of(compare=compared(NAN, NAN, static=1.5, observer=2.5))
     said = advised(found)
     assert "'static' (--anti-windup static): from rest it recovers after 1.5 s" in said["Do"]
-    assert "Do not use 'corrected', with which the loop does not recover from rest." in said["Avoid"]
+    assert "Do not use the anti-windup 'corrected', with which the loop does not recover from rest." in said["Avoid"]
     nothing = advised(found_of(compare=compared(NAN, NAN, enough=4.0)))["Do"]
     assert "With a reference 4 times smaller, or limits 4 times wider, one does" in nothing
     assert "would suffice: in the steady state" in nothing
