@@ -248,8 +248,11 @@ def _on_the_plant_with_its_dead_time(design: Design) -> str:
     if not design.plant.delay_s:
         return ""
     count = roots_right_of(delay_loop(design, design.plant), 0.0)
-    found = f"UNSTABLE, {count} roots in the right half plane: design extended is for it" if count else "stable too"
-    return f"\n  on the plant with its dead time of {design.plant.delay_s:g} s, which no run here has: {found}"
+    roots = f"{count} root{'s' if count > 1 else ''} in the right half plane"
+    found = f"UNSTABLE ({roots}): for it there is design extended" if count else "stable too"
+    return (
+        f"\n  with the plant's dead time of {design.plant.delay_s:g} s, which this design ignores, the loop is {found}"
+    )
 
 
 def _compared(design: Design) -> str:

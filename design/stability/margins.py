@@ -146,7 +146,8 @@ def margins_of(loop: DelayLoop, bound: AdditiveBound) -> Margins:
     outside = tuple(root for root in loop.hidden if root.real >= 0)
     unstable = roots_right_of(loop, 0.0) + sum(root.real > 0 for root in outside)
     if unstable:
-        raise InputError(f"the loop has {unstable} roots in the right half plane; margins are those of a stable loop")
+        roots = f"{unstable} root{'s' if unstable > 1 else ''} in the right half plane"
+        raise InputError(f"the loop has {roots}; margins are those of a stable loop")
     axis = AxisLoop(loop)
     omega, rising = magnitude_crossings(axis)
     delays, listed = delay_intervals(axis, omega, rising)

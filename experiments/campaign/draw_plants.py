@@ -159,7 +159,11 @@ class PlantsWithin:
                 return Member(plant, float(found))
             t *= 1 - shrink
             shrink = min(10 * shrink, MOST_SHRINK)
-        raise InputError("no plant within the additive bound was found along a direction; expected a larger bound")
+        raise InputError(
+            "no plant within W_a was found beside the model in a direction that was drawn, so that no plants are drawn "
+            "at all; expected a W_a that leaves room: of a fit with another --bound-order, --bound-below or "
+            "--bound-above"
+        )
 
     def _resolved(self, omega: np.ndarray) -> np.ndarray:
         """The frequencies but those, next to s = 0, at which the rounding of P alone would show beside W_a."""

@@ -80,7 +80,7 @@ def answers_of_sweep(found: ModelCheck, sweep: SweepCheck) -> Iterator[Answer]:
         rest = ("parameters", "margins", "guarantee") if found.promise else ("parameters",)
         yield from (answer(question, Outcome.OPEN, "no plant was fitted to the sweep") for question in rest)
         return
-    parameters = _parameters(sweep, found.share)
+    parameters = _parameters(found, sweep)
     bound = _bound(found, (sweep.at_lines, sweep.between_lines), sweep.beyond_fit, parameters[0])
     yield answer("within W_a", *bound)
     yield answer("parameters", *parameters)
@@ -145,10 +145,11 @@ def _told(new: float, old: float, said: Callable[[float, int], str]) -> tuple[st
     return told_apart(old if abs(new - old) <= ROUNDING * abs(old) else new, old, 3, said)
 
 
-def _parameters(sweep: SweepCheck, share: float) -> tuple[Outcome, str]:
-    if sweep.moves is None:
+def _parameters(found: ModelCheck, sweep: SweepCheck) -> tuple[Outcome, str]:
+    share, record = found.share, found.model.fit
+    if sweep.moves is None or record is None:
         return Outcome.OPEN, "the model does not say how sure its parameters are, so that only W_a was compared"
-    largest = sorted(sweep.moves, key=lambda move: move.chance)
+    largest = sorted(sweep.moves, key=lambda move: (move.chance, -abs(move.errors)))
     moved = [move for move in largest if move.chance < share]
     untold = sum(not move.could_be_told for move in sweep.moves)
     new = ""
@@ -163,9 +164,17 @@ def _parameters(sweep: SweepCheck, share: float) -> tuple[Outcome, str]:
             Outcome.OPEN,
             "the model's tests differ too much, or the sweep is too noisy, to tell a move of any parameter",
         )
-    first = largest[0]
+    first, open_moves = largest[0], [move for move in largest if move.is_open]
+    if open_moves and not new:
+        words = ", ".join(
+            f"{named(move.parameter)} differs {_by(move)}, and a move of it is told from {found_from(move)} on"
+            for move in open_moves[:NAMED]
+        )
+        tests = f"{len(record.tests)} test{'s are' if len(record.tests) > 1 else ' is'}"
+        return Outcome.OPEN, f"{tests} too few to tell whether a parameter moved: {words}"
     none = "no parameter moved by more than chance"
     none += f"; {named(first.parameter)}, which differs {_by(first)}, comes nearest to a move"
+    none += f", told from {found_from(first)} on" if first.could_be_told else ""
     rest = [f"of {untold} of the {len(sweep.moves)} parameters no move could be told"] if untold else []
     return Outcome.MOVED if new else Outcome.HOLDS, "; ".join([*([new] if new else []), none, *rest])
 
@@ -193,6 +202,13 @@ def relative(share: float) -> str:
     """A share in percent with its sign, in two digits or in whole numbers."""
     percent = 100 * share
     return f"{percent:+.2g} %" if abs(percent) < 99.5 else f"{percent:+.0f} %"
+
+
+def found_from(move: Move) -> str:
+    """The least move that would have been found."""
+    if not move.parameter.value:
+        return f"{1e3 * move.found_from:.2g} ms"
+    return relative(move.found_from)[1:] if move.could_be_told else "never"
 
 
 def _also(move: Move) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc, stdtr, stdtrit
+from scipy.special import chdtrc, ndtr, stdtr, stdtrit
 
 from experiments.checking.new_sweep import NewSweep
 from identification.base.arrays import Real
@@ -35,6 +35,8 @@ class Move:
         least that with which the whole plant's likelihood gains as much by chance.
     found_from
         Relative move from which it would have been found; of a dead time that the model has not, in seconds.
+    is_open
+        Whether the tests are too few to tell: it would be called a move if their standard errors were known for sure.
     """
 
     parameter: Parameter
@@ -42,6 +44,7 @@ class Move:
     errors: float
     chance: float
     found_from: float
+    is_open: bool
 
     @property
     def could_be_told(self) -> bool:
@@ -103,10 +106,12 @@ def moves(model: IdentifiedModel, record: FitRecord, sweep: NewSweep, level: flo
     if fit.sign != np.sign(model.plant.gain):
         errors[0] = np.inf
     alike = chdtrc(size, max(0.0, sweep.gained))
-    chance = np.minimum(1.0, np.maximum(size * 2 * stdtr(freedom, -np.abs(errors)), alike))
+    by_student, by_normal = size * 2 * stdtr(freedom, -np.abs(errors)), size * 2 * ndtr(-np.abs(errors))
+    chance = np.minimum(1.0, np.maximum(by_student, alike))
+    is_open = (by_student >= level) & (np.maximum(by_normal, alike) < level)
     seen = stdtrit(freedom, 1 - level / (2 * size)) * np.sqrt(variance)
     return tuple(
-        Move(parameter, value, float(errors[k]), float(chance[k]), _share(seen, k, parameter))
+        Move(parameter, value, float(errors[k]), float(chance[k]), _share(seen, k, parameter), bool(is_open[k]))
         for k, (parameter, value) in enumerate(zip(model.plant.parameters, _values(sweep), strict=True))
         if k < size
     )

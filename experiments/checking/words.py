@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from math import inf, isinf, pi
 
 from design.stability.margins import Margins
-from experiments.checking.answers import ROUNDING, Outcome, answers, answers_of_sweep, relative
+from experiments.checking.answers import ROUNDING, Outcome, answers, answers_of_sweep, found_from, relative
 from experiments.checking.check_model import ModelCheck, SweepCheck
 from experiments.checking.parameter_moves import Move
 
@@ -103,12 +103,9 @@ def _margins(before: Margins, after: Margins) -> Iterator[tuple[str, ...]]:
 def _row(move: Move, share: float) -> tuple[str, ...]:
     value = move.parameter.value
     moved = relative(move.share) if value else f"{1e3 * move.value:+.2g} ms"
-    found_from = f"{1e3 * move.found_from:.2g} ms"
-    if value:
-        found_from = relative(move.found_from)[1:] if move.could_be_told else "never"
     errors = "other sign" if move.errors == inf else f"{move.errors:+.2f}"
     mark = " MOVED" if move.chance < share else ""
-    return move.parameter.label, f"{value:.5g}", f"{move.value:.5g}", moved, errors + mark, found_from
+    return move.parameter.label, f"{value:.5g}", f"{move.value:.5g}", moved, errors + mark, found_from(move)
 
 
 def _columns(table: Sequence[Sequence[str]]) -> list[str]:

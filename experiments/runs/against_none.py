@@ -56,6 +56,8 @@ class Comparison:
     ----------
     limits
         (lower, upper), in the actuator's unit.
+    conditions
+        Where the limits come from and under which reference the loop starts, in words that follow the limits.
     until_s
         Length of the runs in seconds.
     outcomes
@@ -63,6 +65,7 @@ class Comparison:
     """
 
     limits: tuple[float, float]
+    conditions: str
     until_s: float
     outcomes: dict[str, Outcome]
 
@@ -73,27 +76,27 @@ class Comparison:
         return later or own.last_error > none.last_error * (1 + SAME) + WORTH * BAND
 
     def __str__(self) -> str:
-        """A sentence for each anti-windup, those that are worse than none first; one where no run reaches a limit."""
+        """A sentence for each anti-windup: those that are worse than none, then the corrected one, then the others.
+
+        One sentence where no run reaches a limit.
+        """
+        where = f"under the limits {limits_text(*self.limits)}{self.conditions}"
         if all(each.largest_control <= 1 for each in self.outcomes.values()):
             return (
-                f"no anti-windup acts under the limits {limits_text(*self.limits)}: |u| reaches "
-                f"{self.outcomes['none'].largest_control:.3g} times the limit"
+                f"no anti-windup acts {where}: |u| reaches {self.outcomes['none'].largest_control:.3g} times the limit"
             )
-        names = sorted((name for name in self.outcomes if name != "none"), key=lambda name: not self.is_worse(name))
-        return "\n".join(self._sentence(name) for name in names)
+        names = [name for name in self.outcomes if name != "none"]
+        names.sort(key=lambda name: (not self.is_worse(name), name != "corrected"))
+        return "\n".join(self._sentence(name, where) for name in names)
 
-    def _sentence(self, name: str) -> str:
+    def _sentence(self, name: str, where: str) -> str:
         own, none = self.outcomes[name], self.outcomes["none"]
-        did = [self._did(each) for each in (own, none)]
-        where = (
-            f"under the limits {limits_text(*self.limits)}, from rest under a reference that begins at its crest: "
-            f"it {did[0]}; none {did[1]}"
-        )
+        did = f"{where}: with {name} the loop {self._did(own)}; without anti-windup it {self._did(none)}"
         if self.is_worse(name):
-            return f"{name} is WORSE than no anti-windup {where}"
+            return f"{name} is WORSE than no anti-windup {did}"
         if math.isinf(own.recovery_s):
-            return f"neither with {name} nor without anti-windup does the loop follow {where}"
-        return f"{name} is no worse than no anti-windup {where}"
+            return f"neither with {name} nor without anti-windup does the loop follow {did}"
+        return f"{name} is no worse than no anti-windup {did}"
 
     def _did(self, outcome: Outcome) -> str:
         """What a run does: recovered is y within BAND of what it is without limits, off how far it is from that."""
@@ -130,20 +133,27 @@ def against_none(
         The loop cannot be simulated, or one period of the reference takes too many steps.
     """
     plant, omegas = design.loop_plant, design.reference_omegas
+    asked, crest = "the reference", ""
     if reference is None:
+        asked = "a reference of amplitude 1" + (" at each of its frequencies" if len(omegas) > 1 else "")
+        crest = ", which begins at its crest" if any(omegas) else ""
         reference = Reference((1.0,) * len(omegas), omegas, (math.pi / 2,) * len(omegas), 0.0)
     until, period = _length(design, reference)
     times = np.linspace(0.0, until, SAMPLES)
     free = simulate(design_loop(design, reference, None), (-math.inf, math.inf), times)
+    conditions = f", from rest under {asked}{crest}"
     if limits is None:
         needed = reference.required(plant).at_most
-        limits = limit_pair(ROOM * needed if 0 < needed < math.inf else float(np.abs(free.control).max()) / 2)
+        steady = 0 < needed < math.inf
+        limits = limit_pair(ROOM * needed if steady else float(np.abs(free.control).max()) / 2)
+        whose = f"{ROOM:g} times what {asked} takes" if steady else f"half of what the loop asks for under {asked}"
+        conditions = f", {whose}, from rest under that reference{crest}"
     require_within_region(plant, reference, limits)
     outcomes = {
         name: _outcome(design_loop(design, reference, name), limits, free, reference, period)
         for name in ("none", *design.anti_windup)
     }
-    return Comparison(limits, until, outcomes)
+    return Comparison(limits, conditions, until, outcomes)
 
 
 def _length(design: Design, reference: Reference) -> tuple[float, float]:

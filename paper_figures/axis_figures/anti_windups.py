@@ -49,7 +49,9 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
         physical = f" From {duration(from_s)} after the start on {forced} by the limits."
     return (
         "The anti-windups that there are for this design, each in the same loop under the limits "
-        f"{actuator_said(table, signals.input_unit)}. (a) From rest, and (b) after a disturbance of "
+        f"{actuator_said(table, signals.input_unit)}. Second order, Eq. (2.23), is the published one, a filter with "
+        "two poles; corrected is the one that the program designs in its place. (a) From rest, and "
+        "(b) after a disturbance of "
         f"{with_unit(half, signals.input_unit)} at the plant's input, for a tenth of a period: how far the output is "
         "from that of the loop without limits, over the reference's amplitude; dotted, 1 %, which counts as recovered. "
         "(c), (d) The recovery time and the greatest control asked for, over the larger limit. A full marker: recovery "

@@ -62,10 +62,10 @@ def _divergent(table: pd.DataFrame) -> str:
     shown = table[table["run"].isin(RUNS) & table["rate_hz"].notna()]
     unstable = shown[(shown["stable"] == 0) & (shown["run"] == RUNS[0])]
     most = [
-        f"{METHODS[str(method)][0]} up to {hertz(rows.max())}" for method, rows in unstable.groupby("method")["rate_hz"]
+        f"{hertz(rows.max())} ({METHODS[str(method)][0]})" for method, rows in unstable.groupby("method")["rate_hz"]
     ]
     said = (
-        [f" No run is made where the linear loop is unstable: {', '.join(most)}, but for the computer's rate."]
+        [f" Rates at which the linear loop is unstable are not drawn; the highest is {', '.join(most)}."]
         if most
         else []
     )
@@ -89,6 +89,7 @@ def draw(design: Design, tables: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the figure."""
     least = LEAST * only(tables["rates"], "amplitude")
     table = tables["rates"].assign(steady_error=tables["rates"]["steady_error"].clip(lower=least))
+    table["steady_error"] = table["steady_error"].where(table["stable"] == 1)  # an unstable loop has none
     panel = figure(FULL_WIDTH, 3.2).subplots()
     over_rate(panel, table, RUNS)
     for run in RUNS:

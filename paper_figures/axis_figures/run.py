@@ -11,7 +11,17 @@ from matplotlib.figure import Figure
 from design.design_file import Design
 from experiments.drive.sampled_loop import SampledRun
 from paper_figures.axis_figures.labels import KINDS
-from paper_figures.look.captions import actuator_said, capitalised, duration, last_saturated, of_run, only, with_unit
+from paper_figures.look.captions import (
+    LITTLE,
+    actuator_said,
+    capitalised,
+    duration,
+    is_rounding,
+    last_saturated,
+    of_run,
+    only,
+    with_unit,
+)
 from paper_figures.look.plot_run import plot_run
 
 TABLES: tuple[str, ...] = ("tracking", "tracking_summary")
@@ -35,7 +45,8 @@ def _said(summary: pd.DataFrame, run: str, unit: str) -> str:
     offset, ripple = (of_run(summary, run, column) for column in ("offset", "ripple"))
     if pd.isna(offset):
         return f"{words}: the run diverges"
-    error, last = with_unit(abs(offset) + ripple, unit), duration(only(summary, "span_s"))
+    error = LITTLE if is_rounding(summary, run) else with_unit(abs(offset) + ripple, unit)
+    last = duration(only(summary, "span_s"))
     saturated = last_saturated(of_run(summary, run, "last_saturation_s"))
     return f"{words}: the control {saturated}, the greatest error of the last {last} is {error}"
 

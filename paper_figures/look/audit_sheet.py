@@ -34,4 +34,4 @@ def _instability(design: Design) -> str:
         count = roots_right_of(delay_loop(design, design.loop_plant), 0.0)
     except InputError:
         return ": a root of the loop is on the imaginary axis as far as rounding shows"
-    return f": UNSTABLE, {count} roots in the right half plane" if count else ""
+    return f": UNSTABLE, {count} root{'s' if count > 1 else ''} in the right half plane" if count else ""

@@ -13,6 +13,9 @@ from experiments.runs.metrics import settling_time
 from identification.base.digits import lower_end, told_apart, upper_end
 from identification.base.errors import InputError
 
+ROUNDING = 1e-6  # of the amplitude: a smaller error is no more than that
+LITTLE = "less than a millionth of the amplitude"
+
 
 def number(value: float, digits: int = 3) -> str:
     """Return a number to so many significant digits."""
@@ -118,6 +121,11 @@ def of_run(summary: pd.DataFrame, run: str, column: str) -> float:
     if values.empty:
         raise InputError(f"the summary has no row whose run is {run}; it has {', '.join(map(str, summary['run']))}")
     return float(values.iloc[0])
+
+
+def is_rounding(summary: pd.DataFrame, run: str) -> bool:
+    """Whether the error that a run leaves is less than a millionth of the amplitude: no more than rounding."""
+    return of_run(summary, run, "relative_error_percent") < 100 * ROUNDING
 
 
 def last_saturated(time_s: float) -> str:

@@ -55,7 +55,7 @@ def _do(found: Found, signals: Signals) -> Iterator[str]:
     if design is None:
         return
     tracking, rates = (found.made.get(name) for name in ("tracking", "rates"))
-    best = best_anti_windup(design, found)
+    best = best_anti_windup(found)
     yield from use(design, found, signals)
     if tracking is not None:
         yield _limits(tracking, found.made.get("limits_extended"), signals, best is not None)
@@ -64,16 +64,16 @@ def _do(found: Found, signals: Signals) -> Iterator[str]:
     delay_free = found.design("design_delay_free")
     if delay_free is not None and not _unusable(delay_free):
         late = f"with the plant's dead time of {duration(delay_free.plant.delay_s)}" if delay_free.plant.delay_s else ""
-        yield f"The controller of design_delay_free.json is stable {late or 'on this plant'} too."
+        yield f"The loop with the controller of design_delay_free.json is stable {late or 'around this plant'} too."
 
 
 def _do_not(found: Found, signals: Signals) -> Iterator[str]:
     design, delay_free = found.design("design"), found.design("design_delay_free")
     rates = found.made.get("rates")
     if design is not None:
-        yield from use_not(design, found, signals)
+        yield from use_not(found, signals)
         if rates is not None:
-            yield from avoid(rates, best_anti_windup(design, found), signals)
+            yield from avoid(rates, best_anti_windup(found), signals)
     if delay_free is not None and (why := _unusable(delay_free)):
         yield f"Do not use the controller of design_delay_free.json: {why}."
 
@@ -95,25 +95,24 @@ def _limits(tracking: pd.DataFrame, best: pd.DataFrame | None, signals: Signals,
     unit, within = signals.input_unit, limits_said(tracking, signals.input_unit)
     ends, steady = ("lower_limit", "limit"), ("steady_least", "steady_greatest")
     (low, high), (least, greatest) = ([only(tracking, each) for each in pair] for pair in (ends, steady))
-    takes = f"following the reference takes {number(least)} to {with_unit(greatest, unit)}"
+    takes = f"{number(least)} to {with_unit(greatest, unit)}" if least < greatest else with_unit(greatest, unit)
+    takes = f"in the steady state following the reference takes {takes}"
     share = max(greatest / high, least / low) if low < 0 < high else math.nan
     if low < least and greatest < high:
-        used = "" if math.isnan(share) else f", {number(100 * share, 2)} % of the way to the nearer one"
+        used = f", {number(100 * share, 2)} % of the way to the nearer one" if share > 0 else ""
         unsaturated = only(tracking, "linear_control")
-        reached = (
-            "the control never reaches them"
-            if of_run(tracking, "none", "last_saturation_s") == 0
-            else f"on the way there the loop asks for up to {with_unit(unsaturated, unit)}, and they act"
-        )
+        acts = of_run(tracking, "none", "last_saturation_s") != 0
+        reached = f"in the run the loop without limits asks for up to {with_unit(unsaturated, unit)}, so that they "
+        reached += "act" if acts else "never act"
         if follows:
             return f"The limits {within} suffice for this reference: {takes}{used}; {reached}."
         asked = f"but from rest the loop asks for up to {with_unit(unsaturated, unit)}"
-        return f"The limits {within} suffice in the steady state: {takes}{used}; {asked}, and does not come to follow."
+        return f"The limits {within} would suffice: {takes}{used}; {asked}, and does not come to follow."
     forced = 0.0 if best is None else float(best["periodic_lower"].iloc[0])
     leaves = f": each leaves an error of {with_unit(forced, signals.output_unit)} or more" if forced > 0 else ""
     remedy = f" to {number(100 / share, 2)} % of its size, or widen the limits {number(share)} times"
     return (
-        f"Make the reference smaller{'' if math.isnan(share) else remedy}: the limits {within} do NOT suffice, "
+        f"Make the reference smaller{'' if math.isnan(share) else remedy}: the limits {within} do NOT suffice: "
         f"{takes}, so that no controller follows it{leaves}."
     )
 
@@ -123,7 +122,16 @@ def _assumed(axis: pd.DataFrame | str | None, signals: Signals) -> Iterator[str]
     if not isinstance(axis, pd.DataFrame):
         return
     units = {"limit": signals.input_unit, "amplitude": signals.output_unit, "reference-hz": "Hz", "phase": "rad"}
+    cells = axis.set_index("key")["value"]
+    swings = any(
+        float(hertz) > 0 and float(size) != 0
+        for hertz, size in zip(
+            *(str(cells.get(key, "")).split() for key in ("reference-hz", "amplitude")), strict=False
+        )
+    )
     for row in axis[axis["source"] == "chosen"].to_dict("records"):
+        if row["key"] == "phase" and not swings:  # a constant has no crest
+            continue
         between = " to " if row["key"] == "limit" else ", "
         values = between.join(number(float(value)) for value in str(row["value"]).split())
         yield f"{row['key']} = {values} {units.get(str(row['key']), '')}".rstrip() + f": {row['why']}."

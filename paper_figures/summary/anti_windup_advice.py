@@ -11,17 +11,17 @@ from design.design_file import Design
 from experiments.comparison import SMALLER
 from experiments.runs.against_none import SAME
 from identification.model.signals import Signals
-from paper_figures.look.captions import a_second, number, of_run, only, with_unit
+from paper_figures.look.captions import a_second, is_rounding, number, of_run, only, with_unit
 from paper_figures.summary.build_folder import Found
 from paper_figures.summary.choice import best_anti_windup, enough, harm, is_guaranteed, recoveries, when
 
 
 def use(design: Design, found: Found, signals: Signals) -> Iterator[str]:
     """With which anti-windup to use the controller, and what it does."""
-    best = best_anti_windup(design, found)
+    best = best_anti_windup(found)
     controller = "Use the controller of design.json"
     if best == "none":
-        yield f"{controller} without anti-windup: no anti-windup does better here."
+        yield f"{controller} without anti-windup: with none of those that were run does the loop do better."
     elif best == "corrected":
         promise = _promise(design, found.made.get("tracking"), signals)
         yield f"{controller} with the anti-windup 'corrected': {promise}."
@@ -57,9 +57,9 @@ def _nothing_follows(found: Found) -> str:
     )
 
 
-def use_not(design: Design, found: Found, signals: Signals) -> Iterator[str]:
+def use_not(found: Found, signals: Signals) -> Iterator[str]:
     """Which anti-windups do harm or do not make the loop follow, and what becomes of it without any."""
-    best, said = best_anti_windup(design, found), list(harm(design, found))
+    best, said = best_anti_windup(found), list(harm(found))
     yield from said
     if best in (None, "none"):
         return
@@ -67,12 +67,12 @@ def use_not(design: Design, found: Found, signals: Signals) -> Iterator[str]:
     others = [run for run in times if run != "none" and not (run == "corrected" and said)]
     for place, upset in enumerate(("from rest", "after the disturbance of the comparison")):
         gone = [
-            "that of Eq. (2.23)" if run == "thesis" else f"'{run}'"
+            "'second order, Eq. (2.23)'" if run == "thesis" else f"'{run}'"
             for run in others
             if _fails_first(times[run]) == place
         ]
         if gone and not math.isnan(times[str(best)][place]):
-            yield f"Do not use {_listed(gone)}, with which the loop does not recover {upset}."
+            yield f"Do not use the anti-windup {_listed(gone)}, with which the loop does not recover {upset}."
     yield from _without(str(best), found, signals)
 
 
@@ -96,10 +96,12 @@ def _without(best: str, found: Found, signals: Signals) -> Iterator[str]:
     with_it = f", with it {with_unit(own, signals.output_unit)}" if best == "corrected" else ""
     if math.isnan(none):
         yield "Do not leave the anti-windup out: without it the run under the reference diverges."
-    elif (none > (1 + SAME) * own or not with_it) and of_run(tracking, "none", "last_saturation_s") != 0:
+    elif of_run(tracking, "none", "last_saturation_s") == 0 or is_rounding(tracking, "none"):
+        return
+    elif none > (1 + SAME) * own or not with_it:
         yield (
             f"Do not leave the anti-windup out: without it an error of {with_unit(none, signals.output_unit)} is left "
-            f"in the last period of the run{with_it}."
+            f"at the end of the run{with_it}."
         )
 
 
@@ -137,6 +139,6 @@ def _within_limits(design: Design, tracking: pd.DataFrame | None, signals: Signa
     verdict = "no more" if of_run(tracking, "corrected", "covered") else "MORE, so nothing is guaranteed of this run"
     return (
         "the output is guaranteed to return to that of the loop without limits as long as "
-        f"{signals.input_name} asked for stays below {with_unit(covered, signals.input_unit)}; under this reference it "
-        f"reached {with_unit(reached, signals.input_unit)}, {verdict}"
+        f"the {signals.input_name} asked for stays below {with_unit(covered, signals.input_unit)}; under this "
+        f"reference it reached {with_unit(reached, signals.input_unit)}, {verdict}"
     )

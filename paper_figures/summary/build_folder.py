@@ -59,6 +59,11 @@ class Found:
         """The tables that were not refused."""
         return {name: table for name, table in self.tables.items() if isinstance(table, pd.DataFrame)}
 
+    @property
+    def has_file(self) -> bool:
+        """Whether the reference is that of a file."""
+        return isinstance(self.axis, pd.DataFrame) and "reference" in set(self.axis["key"])
+
     def design(self, name: str) -> Design | None:
         """A design, if it was made."""
         found = self.designs.get(name)

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from design.design_file import Design
 from experiments.runs.against_none import SAME
 from paper_figures.look.captions import duration, of_run
 from paper_figures.summary.build_folder import Found
@@ -32,7 +31,7 @@ def recoveries(found: Found) -> Times:
     return {str(run): (of_run(tracking, str(run), "recovery_s"),) * 2 for run in tracking["run"]}
 
 
-def best_anti_windup(design: Design, found: Found) -> str | None:
+def best_anti_windup(found: Found) -> str | None:
     """What to use: the name of an anti-windup, ``none`` where each does harm, None where no run follows the reference.
 
     Of those that recover from rest, no later than without anti-windup, those count first that recover after a
@@ -40,10 +39,10 @@ def best_anti_windup(design: Design, found: Found) -> str | None:
     """
     times = recoveries(found)
     if not times:
-        return "none" if any(harm(design, found)) else "corrected"
+        return "corrected"
     if all(math.isnan(start) for start, _ in times.values()):
         return None
-    does_harm = any(harm(design, found))
+    does_harm = any(harm(found))
     helping = [
         run
         for run, (start, _) in times.items()
@@ -76,11 +75,8 @@ def _is_later(own: tuple[float, float], none: tuple[float, float]) -> bool:
     return any(not math.isnan(other) and not time <= other * (1 + SAME) for time, other in zip(own, none, strict=True))
 
 
-def harm(design: Design, found: Found) -> Iterator[str]:
-    """Where the corrected anti-windup does harm."""
-    for sentence in design.compared:
-        if sentence.startswith("corrected is WORSE"):
-            yield f"Do not use the anti-windup 'corrected': {sentence.removeprefix('corrected ')}."
+def harm(found: Found) -> Iterator[str]:
+    """Where the corrected anti-windup does harm in the comparison under the user's own reference and limits."""
     times = recoveries(found) if "compare" in found.made else {}
     if not times:
         return

@@ -10,6 +10,7 @@ from math import hypot
 from identification.base.digits import lower_end
 from identification.base.errors import InputError, printable
 from identification.fitting.nominal_plant import ONE_PLANT
+from identification.fitting.structure_fits import ALIKE
 from identification.model.additive_bound import AdditiveBound
 from identification.model.fit_record import FitRecord
 from identification.model.model_file import IdentifiedModel
@@ -171,8 +172,27 @@ def _structure(fit: FitRecord) -> str:
     best = min(others, key=others.__getitem__)
     gain = others[best] - own
     if gain < 0:
-        return f"{form} Its BIC is {number(-gain)} worse than that of {best}: see the cautions.{grown}"
+        return f"{form} Its BIC is {number(-gain)} worse than that of {best}; {_why_worse(fit, best)}.{grown}"
     return f"{form} Its BIC is {number(gain)} better than that of the next best, {best}.{grown}"
+
+
+def _why_worse(fit: FitRecord, best: str) -> str:
+    """Why a structure was taken though another one has the better BIC: the rules of the selection."""
+    own = fit.criterion.chosen
+    if _count(own, "integrator") > _count(best, "integrator"):
+        return f"of structures whose BIC is within {ALIKE:g} the one with most integrators is taken"
+    right = [
+        _count(each, "right-half-plane zero mode") * 2 + _count(each, "right-half-plane real zero")
+        for each in (own, best)
+    ]
+    if right[0] < right[1]:
+        return f"a zero in the right half plane is taken only where the BIC is better by more than {ALIKE:g} for each"
+    return "roots of that one lie far outside the band of the lines, or the data do not determine them"
+
+
+def _count(structure: str, kind: str) -> int:
+    """How many of a kind a structure in words has."""
+    return sum(int(word.split()[0]) for word in structure.split(", ") if word.rstrip("s").endswith(f" {kind}"))
 
 
 def _intervals(fit: FitRecord) -> str:

@@ -93,13 +93,13 @@ def summarise(model: IdentifiedModel, tests: Sequence[FrequencyResponse], found:
         advice=advice(model, found),
         parameters=of_fit.parameter_table(model),
         basis=of_fit.paragraphs(model, tests),
-        runs=None if tracking is None else _runs(tracking, signals),
+        runs=None if tracking is None else _runs(tracking, signals, found.has_file),
         designs=tuple(_designs(found)),
         refused=tuple(_refused(found)),
     )
 
 
-def _runs(tracking: pd.DataFrame, signals: Signals) -> Table:
+def _runs(tracking: pd.DataFrame, signals: Signals, from_file: bool) -> Table:
     """A row for each run under the reference: when it was last at a limit, what it asked for, what error is left."""
     units = (signals.input_unit, signals.output_unit)
     asked, left = (f" [{unit}]" if unit else "" for unit in units)
@@ -107,10 +107,11 @@ def _runs(tracking: pd.DataFrame, signals: Signals) -> Table:
         "run",
         "last at a limit [s]",
         f"most asked for{asked}",
-        f"error, last period{left}",
-        "of the amplitude [%]",
+        f"error at the end{left}",
+        "of half the reference's range [%]" if from_file else "of the amplitude [%]",
     )
-    return Table(head, tuple(_run(row) for row in tracking.to_dict("records")))
+    count = len(head) - tracking["relative_error_percent"].isna().all()  # a ramp has no amplitude
+    return Table(head[:count], tuple(_run(row)[:count] for row in tracking.to_dict("records")))
 
 
 def _run(row: dict[Hashable, Any]) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ from identification.model.plant import PlantModel
 from identification.model.signals import Signals
 from paper_figures.axis_figures.registry import NAMES, axis_figure
 from paper_figures.look.bode import plot_bode
+from paper_figures.look.captions import hertz
 from paper_figures.summary import page
 from paper_figures.summary.build_folder import Found
 from paper_figures.summary.words import summarise
@@ -151,6 +152,17 @@ def test_the_lowest_rate_is_the_one_from_which_on_all_are_near() -> None:
     assert lowest_rate(table, "corrected", "tustin") == 1600.0
     table.loc[table["rate_hz"] == 1600.0, "steady_error"] = np.nan
     assert np.isnan(lowest_rate(table, "corrected", "tustin"))
+
+
+def test_an_unstable_loop_has_no_steady_error(design: Design, tables: Tables) -> None:
+    rates = tables["rates"].copy()
+    unstable = (rates["method"] == "exact") & rates["rate_hz"].notna()
+    rates.loc[unstable, ["stable", "steady_error"]] = [0, 0.0973 * rates["amplitude"].iloc[0]]
+    figure, caption = drawn("rates", design, tables | {"rates": rates})
+    squares = [line for line in figure.axes[0].lines if line.get_marker() == "s"]
+    assert len(squares) > 1
+    assert np.isnan(np.concatenate([np.asarray(line.get_ydata(), float) for line in squares])).all()
+    assert f"the highest is {hertz(rates['rate_hz'].max())} (held inputs)" in caption
 
 
 def test_every_dot_of_the_comparison_is_within_its_panel_and_can_be_told(design: Design, tables: Tables) -> None:

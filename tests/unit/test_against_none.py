@@ -50,6 +50,24 @@ def test_the_outcomes_are_those_of_the_runs(with_harm: Design) -> None:
             assert off[at] > 0.01 >= off[at + 1 :].max()
 
 
+def test_a_sentence_says_whose_limits_they_are_and_the_corrected_one_comes_first(extended_design: Design) -> None:
+    found = against_none(extended_design)
+    needed = abs(1 / extended_design.plant(1.5j))
+    calm = replace(
+        found,
+        outcomes=dict.fromkeys(("none", "thesis", "corrected"), replace(found.outcomes["none"], largest_control=2.0)),
+    )
+    first, second = str(calm).splitlines()
+    assert first.startswith(("corrected is no worse", "neither with corrected"))
+    where = f"under the limits +-{1.2 * needed:.4g}, 1.2 times what a reference of amplitude 1 takes"
+    assert where in first
+    assert where in second
+    assert "begins at its crest" in first
+    given = str(against_none(extended_design, sinusoid(50.0, 1.5, math.pi / 2), (-12.0, 12.0)))
+    assert "under the limits +-12, from rest under the reference: with" in given
+    assert "crest" not in str(against_none(replace(extended_design, reference_omegas=(0.0,))))
+
+
 def test_the_limits_are_what_the_reference_needs_and_more(extended_design: Design) -> None:
     found = against_none(extended_design)
     needed = sinusoid(1.0, 1.5).required(extended_design.plant).value

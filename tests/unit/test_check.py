@@ -312,6 +312,25 @@ def test_a_resonance_of_its_own_is_told(model: IdentifiedModel, height: float, i
     assert ("the sweep shows what the model's structure does not have, near 1" in sentence) == is_told  # of 19 Hz
 
 
+def test_few_scattered_tests_do_not_tell_that_nothing_moved(model: IdentifiedModel) -> None:
+    """14 standard errors are no chance if these are known, but of 2 degrees of freedom they may be."""
+    assert model.fit is not None
+    gain = abs(model.plant.gain)
+    spread = 0.03 * gain / np.sqrt(3)
+    scatter = (spread, *(10 * np.array(model.fit.noise[1:])))
+    scattered = replace(model, fit=replace(model.fit, agreement_of_tests=1e-6, scatter=scatter))
+    sweep = measured(replace(PLANT, gain=1.5 * PLANT.gain), 5)
+    errors = np.log(1.5) / (0.03 * np.sqrt(1 + 1 / 3))
+    assert 12 * stats.norm.sf(errors) < LEVEL / 2 < 12 * stats.t.sf(errors, 2)
+    outcome, sentence = asked(check_model(scattered, [sweep]), "parameters")
+    assert outcome is Outcome.OPEN
+    assert re.match(r"3 tests are too few to tell whether a parameter moved: the gain differs by \+\d\d % ", sentence)
+    least = np.expm1(stats.t.isf(LEVEL / 24, 2) * 0.03 * np.sqrt(4 / 3))
+    told = re.search(r"a move of it is told from (\d+) % on", sentence)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(100 * least, rel=0.1)
+
+
 # the command
 
 

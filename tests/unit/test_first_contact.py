@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from identification.fitting.fit_plant import fit_plant
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 from identification.model.structure import Structure, Wanted
-from identification.output.cautions import cautions
+from identification.output.cautions import _dead_time, cautions
 from identification.sweeps.as_fitted import as_fitted
 from identification.sweeps.kept_responses import read_responses, write_responses
 from identification.sweeps.noise_lines import within, without_noise
@@ -163,6 +164,17 @@ def test_structures_that_the_data_hardly_tell_apart_are_named() -> None:
     assert result.alike
     assert all(abs(more) < 6 for more in result.alike.values())
     assert "structures within 6 of its BIC: " in "\n".join(cautions(result, [measured(plant)]))
+
+
+@pytest.mark.parametrize(("zeros", "stands_in"), [((), False), ((-400.0,), True)])
+def test_a_zero_in_the_right_half_plane_can_stand_in_for_a_dead_time(zeros: tuple[float, ...], stands_in: bool) -> None:
+    """To first order 1 - s/400 is exp(-s/400)."""
+    plant = PlantModel(3.0, (), (Mode(100.0, 0.1),), 0.0, 0, zeros)
+    nominal = SimpleNamespace(intervals=([0.0], [1.4e-3]))
+    result = SimpleNamespace(plant=plant, structure=SimpleNamespace(delayed=False), nominal=nominal)
+    (said,) = _dead_time(result, [measured(plant, np.geomspace(10.0, 900.0, 40))])  # type: ignore[arg-type]
+    assert "in this structure it is at most 0.0014 s" in said
+    assert said.endswith("a zero in the right half plane can stand in for one") == stands_in
 
 
 # sign and stability
