@@ -176,7 +176,7 @@ def test_other_code_than_the_commands_is_refused(campaign: Campaign) -> None:
 def test_a_run_that_diverges_is_a_result(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     from experiments.campaign import run_plants as module
 
-    def diverges(*_: object) -> None:
+    def diverges(*_: object, **__: object) -> None:
         raise module.DivergenceError(1.0)
 
     monkeypatch.setattr(module, "simulate", diverges)
