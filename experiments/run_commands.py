@@ -27,7 +27,7 @@ _run_options = together(
     LIMIT_PAIR,
     click.option(
         "--anti-windup",
-        required=True,
+        default="corrected",
         help="none, thesis, corrected, another of DESIGN, or one of others: see the README.",
     ),
     click.option("--until", type=float, required=True, help="Length of the run in seconds."),
@@ -245,7 +245,9 @@ def sampled_command(
         from paper_figures.look.plot_run import plot_run
         from paper_figures.look.style import figure_writer
 
-        writers[figure] = figure_writer(plot_run({anti_windup: run}, drive.limits, content.signals))
+        is_unstable = "the linear loop is UNSTABLE" in judgement
+        title = f"The linear loop is UNSTABLE at {rate:g} Hz with the method {drive.method}" if is_unstable else ""
+        writers[figure] = figure_writer(plot_run({anti_windup: run}, drive.limits, content.signals, title))
     write_whole(writers, inputs)
     click.echo(_first(promised, f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}"))
 

@@ -60,7 +60,8 @@ def limits_tables(
         over periodic_lower). Cells are empty for what never settles, diverges, or would be divided by zero.
         ``limits_KIND_summary`` for the first limit: lower_limit, limit, rate_limit, start_s, rest_lower, rest_upper
         (see :class:`experiments.physical_limits.least_peak_error.RestLimit`) and tail_NAME, the greatest |error|
-        of the run from start_s to the horizon of three periods.
+        of the run from start_s to the horizon of three periods. The runs' controls are found ones too: where one does
+        better, rest_upper and settling_upper_s are its own.
 
     Raises
     ------
@@ -86,6 +87,8 @@ def limits_tables(
             for run, error in errors.items():
                 tails = np.maximum.accumulate(error[counted][::-1])[::-1]
                 summary[f"tail_{run}"] = tails[np.searchsorted(time_s, summary["start_s"])]
+            reached = summary[["rest_upper", *(f"tail_{run}" for run in errors)]].min(axis=1)
+            summary["rest_upper"] = np.maximum(reached, summary["rest_lower"])
     return {f"limits_{name}": pd.DataFrame(rows), f"limits_{name}_summary": summary}
 
 
@@ -105,10 +108,13 @@ def _row(
     tick()
     if periodic.lower <= band:
         settled = RestLimit(plant, reference, limits, FEWER_STEPS, tick).settling(band)
+    last = time_s >= time_s[-1] - reference.period_s
+    peaks = {run: float(error[last].max()) for run, error in errors.items()}
+    times = {run: settling_time(time_s, errors[run], band) if peaks[run] <= band else math.nan for run in errors}
+    reached = float(np.fmin.reduce([settled.upper, *times.values()]))
     row = {"periodic_lower": periodic.lower, "periodic_upper": periodic.upper}
-    row |= {"settling_lower_s": settled.lower, "settling_upper_s": settled.upper}
-    for run, error in errors.items():
-        row[f"peak_{run}"] = peak = float(error[time_s >= time_s[-1] - reference.period_s].max())
-        row[f"settling_{run}_s"] = settling_time(time_s, error, band) if peak <= band else math.nan
+    row |= {"settling_lower_s": settled.lower, "settling_upper_s": max(reached, settled.lower)}  # NaN of reached stays
+    for run, peak in peaks.items():
+        row |= {f"peak_{run}": peak, f"settling_{run}_s": times[run]}
         row[f"ratio_{run}"] = peak / periodic.lower if periodic.lower > 0 else math.nan
     return row

@@ -21,7 +21,7 @@ class Signals:
     input_name, output_name
         One line of at most 40 characters, such as ``motor current``.
     input_unit, output_unit
-        The same, such as ``A``; empty where nobody said.
+        The same, such as ``A``; empty where nobody said, and of a number without a unit, whose unit may be given as 1.
 
     Raises
     ------
@@ -36,6 +36,8 @@ class Signals:
 
     def __post_init__(self) -> None:
         for field, value in asdict(self).items():
+            if value == "1" and field.endswith("unit"):
+                object.__setattr__(self, field, "")
             least = 1 if field.endswith("name") else 0
             if not (least <= len(value) <= LONGEST and value.isprintable() and value == value.strip()):
                 expected = f"{least} to {LONGEST} characters that print, without blanks at the ends"

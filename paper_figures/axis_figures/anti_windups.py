@@ -25,6 +25,12 @@ UPSETS = {"start": ("a", "c"), "pulse": ("b", "d")}
 SHOWN = 0.5  # of the time that an upset counts
 FLOOR = 1e-3  # of the amplitude
 FEW = 10  # times the least control is the greatest, below which powers of ten are too few ticks
+ROOM = 1.25  # times the time until which a run is away that is shown
+HEADROOM = 1.15  # times the slowest recovery
+NEAR = 0.02  # of two dots, relative, that would hide each other
+TINY = 1e-300
+RING = 3.5  # wider is a dot behind another one
+OVER_LETTERS = {"bbox_to_anchor": (1.0, 1.1)}
 DOT: dict[str, Any] = {"marker": "o", "markersize": 5.0, "linestyle": "none"}
 FILLED = {"global": "full", "none": "none"}  # of a marker; half for a sector
 
@@ -48,7 +54,8 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
         "from that of the loop without limits, over the reference's amplitude; dotted, 1 %, which counts as recovered. "
         "(c), (d) The recovery time and the greatest control asked for, over the larger limit. A full marker: recovery "
         "is guaranteed whatever the control; a half one: as long as the control stays within a bound; an open one: "
-        f"nothing is guaranteed. Recovery from rest and after the disturbance: {said}.{physical}"
+        "nothing is guaranteed. Markers at one place lie around each other. Recovery from rest and after the "
+        f"disturbance: {said}.{physical}"
     )
 
 
@@ -80,7 +87,7 @@ def comparison(tables: Mapping[str, pd.DataFrame], words: Mapping[str, str]) -> 
     handles = axes["a"].get_legend_handles_labels()
     middle = (len(handles[0]) + 1) // 2
     for letter, part in (("a", slice(middle)), ("b", slice(middle, None))):
-        axes[letter].legend(*(each[part] for each in handles), **panels.ABOVE, ncols=2)
+        axes[letter].legend(*(each[part] for each in handles), **(panels.ABOVE | OVER_LETTERS), ncols=2)
     figure = axes["a"].get_figure(root=True)
     assert figure is not None
     return figure
@@ -88,37 +95,48 @@ def comparison(tables: Mapping[str, pd.DataFrame], words: Mapping[str, str]) -> 
 
 def _distances(panel: Axes, runs: pd.DataFrame, begin: float, amplitude: float, words: Mapping[str, str]) -> None:
     time_s = runs["time_s"].to_numpy(float) - begin
-    is_seen = False
+    last_s = 0.0
     for run, said in words.items():
         if f"output_{run}" in runs:
             distance = (runs[f"output_{run}"] - runs["output_unsaturated"]).abs().to_numpy(float) / amplitude
             line = LINES[look_of(run)]
             points = panels.envelope(time_s, np.maximum(distance, FLOOR / 10))
             panel.plot(*points, **line, label=said, zorder=3 - line["linewidth"] / 10)
-            is_seen |= bool((distance > FLOOR).any())
-    if not is_seen:
+            last_s = max(last_s, float(time_s[distance > FLOOR].max(initial=0.0)))
+    if not last_s:
         _say(panel, "no run is away by as much as 0.1 %")
     panel.axhline(SETTLED, **LINES["saturation limits"])
-    panel.set(yscale="log", ylim=(FLOOR, 10.0), xlim=(0.0, time_s[-1]))
+    panel.set(yscale="log", ylim=(FLOOR, 10.0), xlim=(0.0, min(time_s[-1], ROOM * last_s or time_s[-1])))
     panel.set(xlabel="Time after the upset [s]", ylabel=r"$|y - y_\mathrm{unsaturated}|$ / amplitude")
 
 
 def _measures(panel: Axes, table: pd.DataFrame, words: Mapping[str, str]) -> None:
-    for run in words:
-        for _, row in table[(table["run"] == run) & table["recovery_s"].notna()].iterrows():
-            look = DOT | {"fillstyle": FILLED.get(row["guarantee"], "bottom"), "color": LINES[look_of(run)]["color"]}
-            panel.plot(row["largest_control"], row["recovery_s"], **look)
-    if not table["recovery_s"].max() > 0:
-        _say(panel, "every run recovers at once" if (table["recovery_s"] == 0).any() else "no run recovers")
+    """The dots of runs that are at one place are rings around each other."""
+    shown = table[table["run"].isin(list(words)) & table["recovery_s"].notna()]
+    slowest = float(shown["recovery_s"].max())
+    place = np.column_stack([np.log(shown["largest_control"].clip(lower=TINY)), shown["recovery_s"] / (slowest or 1.0)])
+    for i, (_, row) in enumerate(shown.iterrows()):
+        behind = int((np.abs(place[i + 1 :] - place[i]) < NEAR).all(axis=1).sum())
+        look = DOT | {"fillstyle": FILLED.get(row["guarantee"], "bottom"), "color": LINES[look_of(row["run"])]["color"]}
+        look["markersize"] += RING * behind
+        panel.plot(row["largest_control"], row["recovery_s"], **look)
+    if not slowest > 0:
+        _say(panel, "every run recovers at once" if slowest == 0 else "no run recovers")
     panel.set(xscale="log")
     panel.xaxis.set_minor_formatter(NullFormatter())
     low, high = panel.get_xlim()
     if high < FEW * low:
         panel.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    panel.set(xlabel=r"Greatest $|u|$ / limit", ylabel="Recovery time [s]", ylim=(0, None))
+    panel.set(
+        xlabel=r"Greatest $|u|$ / limit",
+        ylabel="Recovery time [s]",
+        ylim=(0, HEADROOM * slowest) if slowest > 0 else (-1, 1),
+    )
+    if not slowest > 0:
+        panel.set_yticks([0] if slowest == 0 else [])
 
 
 def _say(panel: Axes, words: str) -> None:
     """What there is instead of lines."""
-    panel.text(0.5, 0.5, words, transform=panel.transAxes, ha="center", va="center")
+    panel.text(0.5, 0.75, words, transform=panel.transAxes, ha="center", va="center")

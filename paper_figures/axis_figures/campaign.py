@@ -14,7 +14,7 @@ from matplotlib.ticker import NullFormatter
 from design.design_file import Design
 from paper_figures.axis_figures.labels import KINDS, look_of, united
 from paper_figures.look import panels
-from paper_figures.look.captions import actuator_said, duration, number, of_run, only, with_unit
+from paper_figures.look.captions import actuator_said, duration, number, of_run, only, time_unit, with_unit
 from paper_figures.look.style import FULL_WIDTH, LINES, styled
 
 TABLES: tuple[str, ...] = ("campaign", "campaign_summary", "campaign_distance")
@@ -23,7 +23,7 @@ RUNS = ("corrected", "none")  # the thin lines upon the broad ones
 MEASURES = {
     "a": ("peak_error", "Peak error, after a quarter of a period"),
     "b": ("steady_error", "Steady error, of the last period"),
-    "c": ("recovery_s", "Recovery time [s]"),
+    "c": ("recovery_s", "Recovery time"),
 }
 STABLE = panels.band(LINES["family 4"])
 DECADES = 9
@@ -90,13 +90,18 @@ def distributions(tables: Mapping[str, pd.DataFrame], words: Mapping[str, str], 
     axes = panels.lettered(FULL_WIDTH, 4.8, "ab;cd")
     for letter, (measure, label) in MEASURES.items():
         panel = axes[letter]
-        low, high = _view(table[measure], measure)
+        shown = table[table["run"].isin(list(words))]
+        low, high = _view(shown[measure], measure)
+        scale, said_unit = time_unit(high) if measure == "recovery_s" else (1.0, unit)
         for order, (run, said) in enumerate(words.items()):
             rows = table[table["run"] == run]
             line = _steps(rows[measure].to_numpy(float), rows["share"].to_numpy(float), low, high)
-            panel.plot(*line, **LINES[look_of(run)], label=said, zorder=3 + order)
-        panel.set(xlim=(low, high), xscale="log" if high > LOGARITHMIC * low > 0 else "linear")
-        panel.set_xlabel(label if measure == "recovery_s" else united(label, unit))
+            panel.plot(line[0] / scale, line[1], **LINES[look_of(run)], label=said, zorder=3 + order)
+        panel.set(xlim=(low / scale, high / scale), xscale="log" if high > LOGARITHMIC * low > 0 else "linear")
+        panel.set_xlabel(united(label, said_unit))
+        if measure == "recovery_s" and shown[measure].isna().all():
+            panel.text(0.5, 0.5, "no run recovers", transform=panel.transAxes, ha="center", va="center")
+            panel.set_xticks([])
         panel.xaxis.set_minor_formatter(NullFormatter())
     axes["a"].legend(**panels.ABOVE, ncols=2)
     _over_distance(axes["d"], tables["campaign_distance"], list(words))

@@ -23,6 +23,7 @@ RUNS = ("corrected", "none")  # the thin lines upon the broad ones
 FLOOR = LINES["family 4"]
 GREY = panels.paler(FLOOR["color"], 0.6)
 DECADES = 3
+ROOM = 1.25  # times the stretch in which a line is in the view that is shown
 DIVERGENT = 100.0  # a run that exceeds all that is out of reach by more than this leaves the panel
 
 
@@ -37,8 +38,8 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
         f"How much is left to gain from rest under the limits "
         f"{actuator_said(summary, design.signals.input_unit)}: the greatest error from a time on, within three "
         "periods. Grey: what no control within the limits betters, even if it knows the reference in advance; the line "
-        f"on it is reached by some control.{slopes} The error comes to stay within 1 % of the reference's amplitude "
-        f"{best} under the best control that was found, {none} without anti-windup, {corrected} with the "
+        f"on it, or above, is reached by some control.{slopes} The error comes to stay within 1 % of the reference's "
+        f"amplitude {best} under the best control that was found, {none} without anti-windup, {corrected} with the "
         "corrected one."
     )
 
@@ -52,7 +53,7 @@ def draw(design: Design, tables: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the figure."""
     panel = figure(FULL_WIDTH, 2.8).subplots()
     curves(panel, tables["limits_extended_summary"], "start_s", "rest", {f"tail_{run}": look_of(run) for run in RUNS})
-    panel.plot([], [], **FLOOR, label="best possible")
+    panel.plot([], [], **FLOOR, label="best that was found")
     for run in RUNS:
         panel.plot([], [], **LINES[look_of(run)], label=KINDS[run])
     panel.set(xlabel="Time $t_0$ [s]")
@@ -89,7 +90,9 @@ def curves(
     x = table[along]
     greatest = float(np.nanmax([table[column].max() for column in errors]))
     top = 2 * min(greatest, DIVERGENT * float(table[f"{floor}_upper"].max()) or greatest)
-    bottom = top / 10**DECADES
+    bottom, forced = top / 10**DECADES, float(table[f"{floor}_lower"].min())
+    if 0 < forced < bottom:  # it belongs into the view
+        bottom = max(forced / 2, top / 10 ** (2 * DECADES))
     lower, upper = (table[f"{floor}_{end}"].clip(lower=bottom / 10**DECADES) for end in ("lower", "upper"))
     panel.fill_between(x, bottom / 10**DECADES, lower, color=GREY, linewidth=0)
     panel.plot(x, upper, **FLOOR)
@@ -97,4 +100,5 @@ def curves(
         panel.plot(x, table[column], **(LINES[look] | dict(marker or {})))
     panel.set(yscale="log", ylim=(bottom, top))
     if len(x) > 1:
-        panel.set_xlim(x.min(), x.max())
+        seen = x[np.any([upper > bottom, *(~(table[column] <= bottom) for column in errors)], axis=0)]
+        panel.set_xlim(x.min(), min(x.max(), x.min() + ROOM * (seen.max() - x.min()) or x.max()))

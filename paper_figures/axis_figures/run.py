@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from design.design_file import Design
 from experiments.drive.sampled_loop import SampledRun
 from paper_figures.axis_figures.labels import KINDS
-from paper_figures.look.captions import actuator_said, duration, last_saturated, of_run, only, with_unit
+from paper_figures.look.captions import actuator_said, capitalised, duration, last_saturated, of_run, only, with_unit
 from paper_figures.look.plot_run import plot_run
 
 TABLES: tuple[str, ...] = ("tracking", "tracking_summary")
@@ -31,7 +31,7 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _said(summary: pd.DataFrame, run: str, unit: str) -> str:
-    words = KINDS.get(run, run).capitalize()
+    words = capitalised(KINDS.get(run, run))
     offset, ripple = (of_run(summary, run, column) for column in ("offset", "ripple"))
     if pd.isna(offset):
         return f"{words}: the run diverges"

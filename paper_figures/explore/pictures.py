@@ -83,7 +83,7 @@ class Pictures:
         lines = {name: outputs[name] for name in ("reference", "output", "y_lin")}
         shown = _view([outputs["reference"], outputs["output"]])
         _see(self.output.y_range, shown)
-        around = _view([ROOM * np.array(limits)])
+        around = _view([_around(limits)])
         _see(self.control.y_range, around)
         _see(self.output.x_range, (0.0, float(run.time_s[-1])))
         self.data["run"].data = {
@@ -208,6 +208,13 @@ def _key(panel: bokeh_figure) -> None:
     legend.label_text_color = "#000000"
     legend.glyph_height = legend.label_height = 14
     legend.glyph_width = 18
+
+
+def _around(limits: tuple[float, float]) -> np.ndarray:
+    """What is shown of a control: its limits, 0, and as much room on both sides as ROOM says of the range they span."""
+    low, high = min(*limits, 0.0), max(*limits, 0.0)
+    room = (ROOM - 1) * (high - low) / 2
+    return np.array([low - room, high + room])
 
 
 def _view(signals: Sequence[np.ndarray]) -> tuple[float, float]:

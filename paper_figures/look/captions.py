@@ -19,6 +19,11 @@ def number(value: float, digits: int = 3) -> str:
     return f"{value:.{digits}g}"
 
 
+def capitalised(sentence: str, *names: str) -> str:
+    """Return a sentence with a capital, unless one of these names begins it."""
+    return sentence if names and sentence.startswith(names) else f"{sentence[:1].upper()}{sentence[1:]}"
+
+
 def at_least(value: float, digits: int = 3) -> str:
     """Return a lower bound to so many significant digits, rounded towards less so that it stays one."""
     return number(float(lower_end(value, digits)), digits)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import tau
+from functools import cached_property
+from math import isfinite, tau
 
 import numpy as np
 
@@ -13,14 +14,18 @@ from design.blocks.frequency_peak import frequency_grid
 from design.design_file import Design
 from design.stability.characteristic_roots import closing_omega
 from design.stability.delay_loop import DelayLoop
-from design.stability.margins import delay_loop
+from design.stability.margins import Margins, delay_loop, margins_of
+from design.stability.stable_intervals import Margin
 from identification.base.arrays import Complex, Real
+from identification.base.errors import InputError
+from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
 
 FINE = 0.03  # longest step of a curve, over 1 and what it is away from 0
 ROUNDS, MOST = 14, 100_000  # of refinement, and points
 TURNS = 16  # points a turn of the dead time
 BEYOND = 20.0  # times the slowest root that is looked at
+AROUND = 2.0  # times a peak's frequency that is drawn
 SMALL = 0.05  # beyond it |L| is no more
 
 
@@ -32,17 +37,43 @@ class LoopCurves:
     ----------
     loop
         Controller and plant.
-    W_a
-        The additive bound.
+    bound
+        The additive bound W_a.
     """
 
     loop: DelayLoop
-    W_a: Block
+    bound: AdditiveBound
 
     @classmethod
     def of(cls, design: Design, plant: PlantModel | None = None) -> LoopCurves:
         """Of a design's own plant unless another is given."""
-        return cls(delay_loop(design, plant or design.loop_plant), bound_block(design.additive_bound))
+        return cls(delay_loop(design, plant or design.loop_plant), design.additive_bound)
+
+    @cached_property
+    def W_a(self) -> Block:
+        """The bound as a block."""
+        return bound_block(self.bound)
+
+    @cached_property
+    def margins(self) -> Margins | None:
+        """What the audit says of the loop; None of a loop that is not stable, which has no norms."""
+        try:
+            return margins_of(self.loop, self.bound)
+        except InputError:
+            return None
+
+    @property
+    def peaks(self) -> tuple[Margin, ...]:
+        """||S||, ||T|| and ||W_a C S|| of a stable loop, each with its frequency in rad/s; else nothing."""
+        if self.margins is None:
+            return ()
+        modulus = self.margins.modulus
+        return Margin(1 / modulus.value, modulus.omega), self.margins.T_peak, self.margins.W_a_C_S
+
+    @property
+    def peaks_at(self) -> Real:
+        """The frequencies (n,) in rad/s of the peaks but 0 and infinity."""
+        return np.array([peak.omega for peak in self.peaks if peak.omega and isfinite(peak.omega)])
 
     def inner(self, omega: Real) -> Complex:
         """1 - feedback exp(-delay_s s), whose zeros are poles of the controller."""
@@ -68,11 +99,13 @@ class LoopCurves:
         return np.abs(inner / returned), np.abs(around / returned), np.abs(W_a_C_S)
 
     def corners(self) -> tuple[float, float]:
-        """Between which frequencies in rad/s the loop is looked at: beyond its roots, and to where L is small."""
+        """Between which frequencies in rad/s the loop is looked at: beyond its roots and peaks, to where L is small."""
         roots = [abs(root) for root in self._roots if root]
         delays = [1 / delay_s for delay_s in (self.loop.plant.delay_s, self.loop.delay_s) if delay_s]
         slowest = min([*roots, *delays], default=1.0)
-        return slowest / BEYOND, max(closing_omega(self.loop, 0.0, 1.0, SMALL), BEYOND * slowest)
+        top = max(closing_omega(self.loop, 0.0, 1.0, SMALL), BEYOND * slowest)
+        seen = self.peaks_at
+        return min([slowest / BEYOND, *(omega / AROUND for omega in seen)]), max([top, *(AROUND * seen)])
 
     def grid(self) -> Real:
         """Frequencies (n,) in rad/s between the corners that show each root's resonance and each turn of L."""
@@ -119,15 +152,3 @@ def _is_long(points: Complex) -> np.ndarray:
         size = np.abs(points)
         step = np.abs(np.diff(points))
         return np.asarray(~(step <= FINE * (1 + np.minimum(size[:-1], size[1:]))))
-
-
-def lowest(curve: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
-    """Where in rad/s a curve is least, and how much that is: between the neighbours of the least of omega (n,)."""
-    values = curve(omega)
-    for _ in range(4):
-        at = int(np.nanargmin(values))
-        low, high = omega[max(at - 1, 0)], omega[min(at + 1, omega.size - 1)]
-        omega = np.linspace(low, high, 101)
-        values = curve(omega)
-    at = int(np.nanargmin(values))
-    return float(omega[at]), float(values[at])

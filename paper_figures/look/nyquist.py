@@ -16,7 +16,7 @@ from design.design_file import Design
 from identification.base.arrays import Complex, Real
 from identification.model.plant import PlantModel
 from paper_figures.look.frequency_axis import number
-from paper_figures.look.loop_curves import LoopCurves, lowest, traced
+from paper_figures.look.loop_curves import LoopCurves, traced
 from paper_figures.look.panels import ABOVE
 from paper_figures.look.style import styled
 
@@ -60,7 +60,7 @@ def plot_nyquist(design: Design, plant: PlantModel | None = None) -> Figure:
     Figure
         See :func:`draw_nyquist`.
     """
-    figure = Figure(figsize=(4.6, 4.9), layout="constrained")
+    figure = Figure(figsize=(4.6, 5.2), layout="constrained")
     draw_nyquist(figure.subplots(), design, plant)
     return figure
 
@@ -79,23 +79,27 @@ def draw_nyquist(panel: Axes, design: Design, plant: PlantModel | None = None) -
     -----
     At some frequencies, evenly apart in the panel, stands a disc of radius |W_a C| around L: the loop of every plant
     within W_a passes through each of them, and none of them holds -1 if |W_a C S| < 1. The one that comes nearest to
-    that is drawn stronger. The circle around -1 has the radius min |1 + L| = 1/||S||. Dots on the curve say where it
-    is at a frequency in Hz. Towards a pole of L on the imaginary axis the curve leaves the panel.
+    that is drawn stronger. The circle around -1 has the radius min |1 + L| = 1/||S||. Both norms are those of the
+    audit; a loop that is not stable has none, and neither circle. Dots on the curve say where it is at a frequency in
+    Hz. Towards a pole of L on the imaginary axis the curve leaves the panel.
     """
     curves = LoopCurves.of(design)
     grid = curves.grid()
     omega, points = traced(curves.open, grid)
-    modulus = lowest(lambda at: 1 / curves.magnitudes(at)[0], grid)[1]
+    margins = curves.margins
+    modulus = margins.modulus.value if margins else 0.0
     view = _view(points, modulus)
     side = view[1] - view[0]
     at = omega[_spread(points, curves.radius(omega), view, STEP * side)]
     _discs(panel, curves.open(at), curves.radius(at))
-    nearest, least = lowest(lambda at: 1 / curves.magnitudes(at)[2], grid)
-    centre = curves.open(np.array([nearest]))[0]
-    if np.isfinite(centre):
-        said = rf"$\|W_a C S\|$ = {1 / least:.3g}, at {number(nearest / tau)} Hz"
-        _circle(panel, centre, float(curves.radius(np.array([nearest]))[0]), WORST, said)
-    _circle(panel, -1, modulus, MARGIN, rf"$1/\|S\|$ = {modulus:.3g}")
+    if margins:
+        nearest = margins.W_a_C_S.omega or 0.0
+        where = np.array([nearest])
+        centre, radius = curves.open(where)[0], float(curves.radius(where)[0])
+        if np.isfinite(centre) and np.isfinite(radius):
+            said = rf"$\|W_a C S\|$ = {margins.W_a_C_S.value:.4g}, at {number(nearest / tau)} Hz"
+            _circle(panel, centre, radius, WORST, said)
+        _circle(panel, -1, modulus, MARGIN, rf"$1/\|S\|$ = {modulus:.4g}")
     _circle(panel, 0, 1, UNIT)
     panel.plot(points.real, points.imag, **LOOP, label=r"$L = P\,C$")
     if plant is not None:

@@ -17,7 +17,7 @@ from identification.base.arrays import Real
 from identification.base.errors import InputError
 from identification.model.signals import UNNAMED, Signals
 from paper_figures.look.frequency_axis import plain
-from paper_figures.look.panels import MOST_POINTS, band, envelope, key, view
+from paper_figures.look.panels import MOST_POINTS, band, envelope, key, paler, view
 from paper_figures.look.stretches import saturated_stretches
 from paper_figures.look.style import FAMILY, FULL_WIDTH, LINES, panel_letters, styled
 
@@ -33,9 +33,13 @@ KINDS = {
 }
 """The lines of the runs of each anti-windup by its name; others have the next one of the family's."""
 SATURATED: dict[str, Any] = {"facecolor": "#E9DFC6", "edgecolor": "none", "zorder": 0.5}
+IN_FRONT: dict[str, Any] = {"ha": "center", "va": "center", "bbox": {"facecolor": "white", "edgecolor": "none"}}
+PALE = 0.6  # share of white
 THIN = 0.9
 FAR = 1.0  # times the view of the control, within which a limit that it does not reach is shown too
 EDGE = 0.06
+NARROWEST = 0.005  # of the time axis: a shaded stretch is drawn at least as wide, so that it is seen
+SWINGS = 200  # from beyond one limit to beyond the other; more would fill the panel, so that they are counted and paler
 BEYOND = 1.0  # of the range of the limits, up to which u is shown above and below them
 
 
@@ -44,6 +48,7 @@ def plot_run(
     runs: AnyRun | Mapping[str, AnyRun],
     limits: float | Sequence[float] | None = None,
     signals: Signals = UNNAMED,
+    title: str = "",
 ) -> Figure:
     """Draw a run, or several of one reference one upon the other.
 
@@ -56,6 +61,8 @@ def plot_run(
         them is shaded. Neither unless given.
     signals
         Names and units of the plant's input and output; those of a design are ``design.signals``.
+    title
+        What stands above all.
 
     Returns
     -------
@@ -95,6 +102,8 @@ def plot_run(
     for panel in panels:
         panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.7g}"))
     panel_letters(panels)
+    if title:
+        figure.suptitle(title)
     figure.align_ylabels()
     return figure
 
@@ -103,7 +112,11 @@ def _control(panel: Axes, name: str, run: AnyRun, line: Mapping[str, Any], limit
     """Draw what is asked for upon what the actuator gives out, the limits, and when it is beyond them."""
     low, high = limits or (-np.inf, np.inf)
     _line(panel, run, run.saturated_control, band(line), "actuator")
-    _line(panel, run, run.control, {**line, "linewidth": THIN}, f"control $u${_beside(name)}")
+    swings = _swings(run.control, (low, high))
+    color = paler(line["color"], PALE) if swings > SWINGS else line["color"]
+    _line(panel, run, run.control, {**line, "linewidth": THIN, "color": color}, f"control $u${_beside(name)}")
+    if swings > SWINGS:
+        panel.text(0.5, 0.5, f"from limit to limit {swings} times", transform=panel.transAxes, **IN_FRONT)
     ends = [end for end in (low, high) if isfinite(end)]
     least = low if isfinite(low) else float(run.saturated_control.min())
     most = high if isfinite(high) else float(run.saturated_control.max())
@@ -116,12 +129,23 @@ def _control(panel: Axes, name: str, run: AnyRun, line: Mapping[str, Any], limit
     for i, end in enumerate(ends):
         panel.axhline(end, **LINES["saturation limits"], zorder=3, label=None if i else "limits")
     if limits is not None:
-        bars = _merged(saturated_stretches(run, limits), float(run.time_s[-1] - run.time_s[0]) / MOST_POINTS)
+        first, last = float(run.time_s[0]), float(run.time_s[-1])
+        bars = _merged(saturated_stretches(run, limits), (last - first) / MOST_POINTS)
         if len(bars):
-            spans = [(start, end - start) for start, end in bars]
+            least = NARROWEST * (last - first)
+            widths = np.maximum(bars[:, 1] - bars[:, 0], least)
+            spans = list(zip(np.minimum(bars[:, 0], last - widths), widths, strict=True))
             across = panel.get_xaxis_transform()
-            panel.broken_barh(spans, (0, 1), transform=across, label="beyond them", **SATURATED)
+            narrow = np.any(bars[:, 1] - bars[:, 0] < least)
+            said = f"beyond them, at least {100 * NARROWEST:g} % wide" if narrow else "beyond them"
+            panel.broken_barh(spans, (0, 1), transform=across, label=said, **SATURATED)
     key(panel)
+
+
+def _swings(control: Real, limits: tuple[float, float]) -> int:
+    """How often a control goes from beyond one limit to beyond the other."""
+    sides = np.where(control > limits[1], 1, np.where(control < limits[0], -1, 0))
+    return int(np.count_nonzero(np.diff(sides[sides != 0])))
 
 
 def _line(panel: Axes, run: AnyRun, values: Real, line: Mapping[str, Any], label: str) -> None:

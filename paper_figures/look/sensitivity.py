@@ -14,7 +14,7 @@ from design.design_file import Design
 from design.parameters import ExtendedParameters
 from identification.model.plant import PlantModel
 from paper_figures.look.frequency_axis import HERTZ, hertz, over_hertz
-from paper_figures.look.loop_curves import LoopCurves, lowest
+from paper_figures.look.loop_curves import LoopCurves
 from paper_figures.look.panels import ABOVE
 from paper_figures.look.style import FULL_WIDTH, styled
 
@@ -67,21 +67,22 @@ def draw_sensitivity(panel: Axes, design: Design, plant: PlantModel | None = Non
     -----
     |S| above 2 is a gain margin below 2. |W_a C S| below 1 at every frequency stabilises every plant within W_a with as
     many poles in the right half plane, and the level that a robust design was asked for is drawn too. At the
-    frequencies of the reference, which are marked, S = 0 and T = 1.
+    frequencies of the reference, which are marked, S = 0 and T = 1. The peaks are the norms of the audit; an unstable
+    loop has none.
     """
     curves = LoopCurves.of(design, plant)
     grid = curves.grid()
     shown = [omega for omega in design.reference_omegas if omega > 0]
     low, high = curves.corners()
-    low = min(shown) / BELOW if shown else low
+    low = min([min(shown) / BELOW, *curves.peaks_at]) if shown else low
     beside = np.multiply.outer(shown, 1 + np.outer([-1, 1], BESIDE)).ravel()  # the controller has poles at them
-    omega = np.unique([*grid[(grid >= low) & (grid <= high)], *np.geomspace(low, high, POINTS), *beside])
+    inside = grid[(grid >= low) & (grid <= high)]
+    omega = np.unique([*inside, *np.geomspace(low, high, POINTS), *beside, *curves.peaks_at])
     magnitudes = curves.magnitudes(omega)
-    top = USUAL
-    for k, ((name, line), values) in enumerate(zip(LINES, magnitudes, strict=True)):
-        peak = 1 / lowest(lambda at, k=k: 1 / curves.magnitudes(at)[k], grid)[1]  # type: ignore[misc]
-        panel.plot(hertz(omega), np.maximum(values, DEPTH / 10), **line, label=rf"$|{name}|$, peak {peak:.3g}")
-        top = max(top, peak)
+    said = [f", peak {peak.value:.4g}" for peak in curves.peaks] or [""] * len(LINES)
+    for (name, line), values, peak in zip(LINES, magnitudes, said, strict=True):
+        panel.plot(hertz(omega), np.maximum(values, DEPTH / 10), **line, label=f"$|{name}|${peak}")
+    top = max(USUAL, *(float(np.nanmax(values)) for values in magnitudes))
     levels = {USUAL: f"{USUAL:g}", 1.0: "1"}
     roll_off = design.parameters.roll_off if isinstance(design.parameters, ExtendedParameters) else None
     if roll_off is not None:

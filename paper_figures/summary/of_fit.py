@@ -18,7 +18,7 @@ from identification.model.reports import BoundReport, SubspaceCheck
 from identification.model.signals import UNNAMED, Signals
 from identification.output.fit_facts import bound_text, digits_of
 from identification.sweeps.response import FrequencyResponse
-from paper_figures.look.captions import number
+from paper_figures.look.captions import capitalised, number
 
 Paragraph = tuple[str, str]
 """A head and sentences."""
@@ -229,11 +229,9 @@ def _checks(checks: Mapping[str, SubspaceCheck]) -> Iterator[str]:
 
 def cautions(model: IdentifiedModel) -> list[str]:
     """What the data leave open, a sentence each; raises InputError if the model does not say how it was fitted."""
-    return [_sentence(said) for said in fitted(model).cautions]
-
-
-def _sentence(said: str) -> str:
-    return f"{said[0].upper()}{said[1:]}."
+    fit = fitted(model)
+    names = [test.name for test in fit.tests]
+    return [f"{capitalised(said, *names)}." for said in fit.cautions]
 
 
 def _bound(bound: AdditiveBound, report: BoundReport) -> str:
@@ -248,5 +246,5 @@ def _bound(bound: AdditiveBound, report: BoundReport) -> str:
         f"{number(report.largest_excess)} times at most (no bound of this order gets below "
         f"{lower_end(report.least_excess, 3)})."
         + (f" It touches {', '.join(touches)}." if touches else "")
-        + (f" {_sentence(str(report.outside))}" if report.outside else "")
+        + (f" {capitalised(str(report.outside))}." if report.outside else "")
     )

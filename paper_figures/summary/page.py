@@ -27,6 +27,7 @@ SIZES = (8.5, 8.0, 7.5, 7.0, 6.5, 6.0)  # of the letters [pt]; the first that le
 LEAST, MOST = 3.4, 5.8  # height of the panels with what stands around them [in]
 LINE = 1.3 / 72  # height of a line for each pt of its letters [in]
 HINTED = 1.05  # width of letters fitted to the pixels of a PNG, to that of the same letters in the PDF: up to this
+BOLD = 1.1  # width of bold letters to that of others
 SPACE = 0.25  # width of a space, of the letters' size
 GAP = 0.3  # widest between the columns of a table [in]
 SYNTHETIC = "#D55E00"
@@ -137,7 +138,8 @@ def _panels(
 
 
 def _heading(summary: Summary, size: float) -> Block:
-    lines = [(Piece(0, summary.title, weight="bold"),)]
+    broken = _broken(summary.title, (WIDTH - 2 * MARGIN) / BOLD, size + 1)
+    lines = [(Piece(0, line, weight="bold"),) for line in broken]
     if summary.synthetic:
         lines.append((Piece(0, summary.synthetic, weight="bold", color=SYNTHETIC),))
     return Block(size + 1, tuple(lines))

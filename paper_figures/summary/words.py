@@ -14,7 +14,7 @@ from identification.base.errors import InputError
 from identification.model.model_file import IdentifiedModel
 from identification.model.signals import Signals
 from identification.sweeps.response import FrequencyResponse
-from paper_figures.look.captions import number
+from paper_figures.look.captions import capitalised, number
 from paper_figures.summary import of_fit
 from paper_figures.summary.advice import FOLLOWS, advice
 from paper_figures.summary.build_folder import DESIGNS, Found
@@ -88,7 +88,7 @@ def summarise(model: IdentifiedModel, tests: Sequence[FrequencyResponse], found:
     synthetic = sum(test.synthetic for test in tests)
     tracking = found.made.get("tracking")
     return Summary(
-        title=f"{signals.output_name.capitalize()} over {signals.input_name}: plant with {fit.structure}",
+        title=f"{signals.output_name} over {signals.input_name}: plant with {fit.structure}",
         synthetic=f"SYNTHETIC DATA: {synthetic} of {len(tests)} tests were never measured" if synthetic else "",
         advice=advice(model, found),
         parameters=of_fit.parameter_table(model),
@@ -140,7 +140,7 @@ def _refused(found: Found) -> Iterator[Paragraph]:
     said |= {DESIGNS[name]: each for name, each in found.designs.items() if isinstance(each, str)}
     said |= {FOLLOWS[name]: each for name, each in found.tables.items() if isinstance(each, str)}
     for what, sentence in said.items():
-        yield "Refused", f"{what[0].upper()}{what[1:]}: {sentence}."
+        yield "Refused", f"{capitalised(what)}: {sentence}."
 
 
 def _aligned(table: Table) -> str:

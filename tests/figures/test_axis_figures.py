@@ -153,6 +153,30 @@ def test_the_lowest_rate_is_the_one_from_which_on_all_are_near() -> None:
     assert np.isnan(lowest_rate(table, "corrected", "tustin"))
 
 
+def test_every_dot_of_the_comparison_is_within_its_panel_and_can_be_told(design: Design, tables: Tables) -> None:
+    same = tables["compare"].assign(recovery_s=6.7, largest_control=66.8, refused=np.nan)
+    figure, _ = drawn("anti_windups", design, tables | {"compare": same})
+    for panel in figure.axes[2:]:
+        dots = [line for line in panel.lines if len(line.get_xdata()) == 1]
+        assert len(dots) > 3
+        assert 0.95 * panel.get_ylim()[1] > 6.7
+        sizes = [dot.get_markersize() for dot in dots]
+        assert sizes == sorted(set(sizes), reverse=True), "what is behind is wider"
+
+
+def test_where_nothing_recovers_the_campaign_says_so(design: Design, tables: Tables) -> None:
+    campaign = tables["campaign"].copy()
+    campaign.loc[campaign["run"] != "thesis", "recovery_s"] = np.nan
+    figure, _ = drawn("campaign", design, tables | {"campaign": campaign})
+    assert "no run recovers" in [text.get_text() for text in figure.axes[2].texts]
+
+
+def test_a_forced_error_is_in_the_view_of_the_limits(design: Design, tables: Tables) -> None:
+    rest = tables["limits_extended_summary"].assign(rest_lower=0.363, rest_upper=0.364, tail_none=245.0)
+    figure, _ = drawn("limits", design, tables | {"limits_extended_summary": rest})
+    assert figure.axes[0].get_ylim()[0] < 0.363
+
+
 def test_a_campaign_says_what_became_of_the_plants(design: Design, tables: Tables) -> None:
     _, caption = drawn("campaign", design, tables)
     for part in (

@@ -154,7 +154,7 @@ def test_page_and_text_hold_the_same_cells(arguments):
 
 
 FULL_PAGE = """
-Level over valve current: plant with
+level over valve current: plant with
 SYNTHETIC DATA: 2 of 2 tests
 Do: Use the controller of design.json with the anti-windup 'corrected'
 stays below 17.2 mA; under this reference it reached 12.8 mA, no more.
@@ -312,7 +312,11 @@ def test_what_the_fit_leaves_is_said():
         fit,
         tests=tuple(replace(test, median_distance=0.25) for test in fit.tests),
         misfit=fit.noise,
-        cautions=("a median distance of 25 % is more than noise leaves", "no dead time can be told from none"),
+        cautions=(
+            "a median distance of 25 % is more than noise leaves",
+            "no dead time can be told from none",
+            f"{tests[0].name}: the plant misses the line at 2 Hz",
+        ),
         agreement_of_tests=0.5,
         criterion=Criterion("BIC", 19.5, {fit.structure: 5.0}, fit.structure),
         checks={
@@ -326,7 +330,7 @@ def test_what_the_fit_leaves_is_said():
         "differ by no more: tests of one plant would differ as much with a probability of 0.5",
         "No other structure was tried. The deviance is divided by 19.5",
         "A median distance of 25 % is more than noise leaves.",
-        "No dead time can be told from none.",
+        f"No dead time can be told from none. {tests[0].name}: the plant misses",
         "the intervals are widened for it",
         "finds 2 of their 4 modes, omega within 2.5 % and zeta within 50 % of the fit.",
         "N4SID finds no pole of 20 rad/s (day_0.csv), pole of 20 rad/s (day_1.csv).",

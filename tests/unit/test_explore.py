@@ -26,8 +26,10 @@ from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
+from identification.model.signals import Signals
 from paper_figures.explore.compute import Explorer, saturated
 from paper_figures.explore.newest import Newest
+from paper_figures.explore.pictures import Pictures
 from paper_figures.explore.ranges import ranges
 from paper_figures.explore.state import State, from_words, start_of
 from paper_figures.explore.words import run_text, table, true_plant_text, without_tex
@@ -129,6 +131,14 @@ def test_the_shaded_times_are_those_in_which_the_control_is_beyond_a_limit(explo
         near = [beyond[max(0, k - 3) : k + 4].any() or np.abs(times - run.time_s[k]).min() < 3 * step for k in gaps]
         assert all(near)
         assert (len(times) == 0) == (not beyond.any())
+
+
+def test_both_limits_are_in_the_view_wherever_they_lie(explorer: Explorer) -> None:
+    pictures = Pictures(Signals())
+    for low, high in ((4.0, 15.0), (-15.0, -4.0), (-3.0, 8.0)):
+        pictures.show_run(explorer.run(explorer.start), (low, high))
+        view = pictures.control.y_range
+        assert view.start < low < high < view.end
 
 
 def test_the_discs_are_those_of_the_controller_by_hand(extended_design: Design, explorer: Explorer) -> None:

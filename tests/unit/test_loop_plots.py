@@ -21,6 +21,7 @@ from identification.model.model_file import IdentifiedModel
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 from paper_figures.look.audit_sheet import plot_audit
+from paper_figures.look.frequency_axis import number
 from paper_figures.look.nyquist import plot_nyquist
 from paper_figures.look.sensitivity import plot_sensitivity
 
@@ -130,7 +131,21 @@ def test_sensitivities_are_those_of_the_loop_with_the_audits_peaks(design: Desig
         np.testing.assert_allclose(values[shown], expected[shown], rtol=1e-5)
         peak = re.search(r"peak (\S+)", str(line.get_label()))
         assert peak is not None
-        assert float(peak[1]) == pytest.approx(peaks[name], rel=6e-3)
+        assert float(peak[1]) == pytest.approx(peaks[name], rel=6e-4)
+
+
+def test_a_peak_far_beyond_the_bandwidth_is_found_and_shown(extended_design: Design) -> None:
+    design = replace(extended_design, additive_bound=AdditiveBound.printed_form(1e-4, 100.0, 9e3, 0.02))
+    omega = np.geomspace(1.0, 1e5, 400_001)
+    C = controller(design, omega)
+    L = design.loop_plant(1j * omega) * C
+    size = np.abs(design.additive_bound(1j * omega) * C / (1 + L))
+    at = int(np.argmax(size))
+    assert abs(L[at]) < 1e-2  # far below what is looked at for L
+    line = line_of(plot_sensitivity(design).axes[0], "$|W_a")
+    assert str(line.get_label()).endswith(f"peak {size[at]:.4g}")
+    assert np.max(line.get_ydata()) == pytest.approx(size[at], rel=1e-4)
+    assert line_of(plot_nyquist(design).axes[0], r"$\|W_a").get_label().endswith(f"{number(omega[at] / tau)} Hz")
 
 
 def test_levels_and_frequencies_of_the_reference_are_marked() -> None:
@@ -148,4 +163,7 @@ def test_levels_and_frequencies_of_the_reference_are_marked() -> None:
 def test_an_unstable_loop_is_called_so(extended_design: Design) -> None:
     plant = extended_design.plant
     worse = replace(extended_design, plant=replace(plant, gain=-plant.gain))
-    assert "UNSTABLE" in plot_audit(worse).get_suptitle()
+    figure = plot_audit(worse)
+    assert "UNSTABLE" in figure.get_suptitle()
+    said = [text.get_text() for panel in figure.axes for text in panel.get_legend().get_texts()]
+    assert not any("peak" in each or r"\|" in each for each in said), "an unstable loop has no norms"

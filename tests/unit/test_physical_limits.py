@@ -303,10 +303,11 @@ def test_no_run_betters_the_floor(tables: dict[str, pd.DataFrame]) -> None:
         assert (rows[f"peak_{run}"] >= rows["periodic_lower"]).all()
         assert rows[f"ratio_{run}"][0] == pytest.approx(rows[f"peak_{run}"][0] / rows["periodic_lower"][0])
         assert (rest[f"tail_{run}"] >= rest["rest_lower"] - 1e-9).all()
+        assert (rest[f"tail_{run}"] >= rest["rest_upper"] - 1e-9).all(), "its control is one that was found"
         assert (np.diff(rest[f"tail_{run}"]) <= 0).all()
         settled = rows[f"settling_{run}_s"]
         assert np.isnan(settled[0])
-        assert np.isnan(settled[1]) or settled[1] >= rows["settling_lower_s"][1]
+        assert np.isnan(settled[1]) or settled[1] >= rows["settling_upper_s"][1] >= rows["settling_lower_s"][1]
     assert rows["ratio_none"].isna().tolist() == [False, True]
 
 
@@ -357,20 +358,22 @@ def test_usual_limits(delay_free_design: Design, monkeypatch: pytest.MonkeyPatch
 def test_command_line(extended_design: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
-    def found(design: Design, reference: Reference, limits: Sequence[float], tick: object) -> dict[str, pd.DataFrame]:
-        asked.append((design.kind, reference, limits))
+    def found(
+        design: Design, reference: Reference, limits: Sequence[float], tick: object, *runs: object
+    ) -> dict[str, pd.DataFrame]:
+        asked.append((design.kind, reference, limits, *runs))
         return {"limits_extended": pd.DataFrame({"limit": [2.0]}), "limits_extended_summary": pd.DataFrame({"a": [1]})}
 
     monkeypatch.setattr("experiments.physical_limits.limits_tables.limits_tables", found)
     path = tmp_path / "design.json"
     path.write_text(extended_design.to_json(), encoding="utf-8")
-    own = ["limits", "--limit", "9", "--limit", "-3", "12.5", "--amplitude", "7", "--offset", "2"]
+    own = ["limits", "--limit", "9", "--limit", "-3", "12.5", "--amplitude", "7", "--offset", "2", "--rate-limit", "4"]
     for given in (["thesis", "limits"], own):
         result = CliRunner().invoke(main, [*given, str(path), "--output", str(tmp_path)])
         assert (result.exit_code, result.output) == (0, "")
     assert asked == [
         ("extended", thesis_reference("extended", (1.5,)), several_limits(extended_design)),
-        ("extended", Reference((7.0,), (1.5,), (0.0,), 2.0), ((9.0,), (-3.0, 12.5))),
+        ("extended", Reference((7.0,), (1.5,), (0.0,), 2.0), ((9.0,), (-3.0, 12.5)), ("none", "corrected"), 4.0),
     ]
     assert sorted(file.name for file in tmp_path.glob("*.csv")) == [
         "limits_extended.csv",

@@ -78,6 +78,19 @@ def test_a_computers_control_is_held_until_its_next_sample() -> None:
     assert not shaded(plot_run(run).axes[-1]).size
 
 
+def test_what_is_drawn_can_be_seen() -> None:
+    """A stretch of one sample in 2000 is wide enough; a control that fills the panel is pale and its swings counted."""
+    time_s = np.arange(2001) / 2000
+    rest = time_s, 0 * time_s, 0 * time_s, 0 * time_s
+    control = np.where(time_s == 0, 5.0, 0.0)
+    panel = plot_run(SampledRun(*rest, control, np.clip(control, -1, 1)), 1).axes[2]
+    assert shaded(panel) == pytest.approx(np.array([[0.0, 0.005]]))
+    assert "beyond them, at least 0.5 % wide" in [text.get_text() for text in panel.get_legend().get_texts()]
+    control = 1e6 * (-1.0) ** np.arange(2001)
+    panel = plot_run(SampledRun(*rest, control, np.clip(control, -1, 1)), 1).axes[2]
+    assert "from limit to limit 2000 times" in [text.get_text() for text in panel.texts]
+
+
 def test_panels_have_names_units_limits_and_every_run(runs: dict[str, Run]) -> None:
     signals = Signals("motor $ current", "A", "arm angle", "rad")
     output, error, none, corrected = plot_run(runs, LIMITS, signals).axes

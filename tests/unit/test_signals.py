@@ -23,6 +23,9 @@ def test_the_labels_name_the_unit_where_it_is_known() -> None:
     assert Signals(input_unit="N m", output_unit="m/s^2").gain_unit == "m/s^2/(N m)"
     assert Signals(input_unit="V").gain_unit == "1/V"
     assert Signals(output_unit="m").gain_unit == "m"
+    duty = Signals("duty cycle", "1", "voltage", "V")
+    assert (duty.input, duty.gain_unit, duty.input_unit) == ("duty cycle", "V", "")
+    assert Signals(input_unit="A", output_unit="1").gain_unit == "1/A"
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,7 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     axes = panels.lettered(FULL_WIDTH, 2.8, "ab")
     rest, periodic = tables["limits_extended_summary"], tables["limits_delay_free"]
     curves(axes["a"], rest, "start_s", "rest", {f"tail_{run.name}": run.kind for run in RUNS})
-    axes["a"].plot([], [], **FLOOR, label="best possible")
+    axes["a"].plot([], [], **FLOOR, label="best that was found")
     for run in RUNS:
         axes["a"].plot([], [], **LINES[run.kind], label=run.label)
     axes["a"].set(xlabel="Time $t_0$ [s]", ylabel=r"$\max_{t \geq t_0}\,|e(t)|$")

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from experiments.runs.guarantee import sector_text
 from paper_figures.axis_figures.campaign import UNSURE, band, distributions
-from paper_figures.look.captions import number, of_limits, of_run, only
+from paper_figures.look.captions import capitalised, number, of_limits, of_run, only
 from paper_figures.look.panels import CORRECTED, NONE, THESIS
 from paper_figures.look.style import styled
 
@@ -67,8 +67,7 @@ def _outcomes(summary: pd.DataFrame) -> str:
             f"{label} {_percent(recovered)} recover{after}, {_percent(diverged)} diverge, and the median of the last "
             f"period's error is {size}"
         )
-    sentence = "; ".join(said)
-    return sentence[0].upper() + sentence[1:]
+    return capitalised("; ".join(said))
 
 
 def _percent(share: float) -> str:
