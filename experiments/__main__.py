@@ -17,7 +17,7 @@ import click
 
 from experiments.axis_command import axis_command
 from experiments.campaign.command import campaign_command
-from experiments.options import DESIGN, OUTPUT_FOLDER, RATE_LIMIT, asked_limits, sinusoid_options
+from experiments.options import DESIGN, OUTPUT_FOLDER, RATE_LIMIT, asked_limits, reference_options, sinusoid_options
 from experiments.pair_options import NumberPair, PairCommand
 from experiments.run_commands import sampled_command, simulate_command
 from experiments.table_commands import rates_command, tracking_command
@@ -106,20 +106,20 @@ def limits(
     help="Saturation limits in the actuator's unit; +- 1.2 times what the reference needs unless given.",
 )
 @RATE_LIMIT
-@sinusoid_options
+@reference_options
 @OUTPUT_FOLDER
 def compare(design: Path, limit: tuple[float, ...] | None, rate_limit: float, output: Path, **reference: Any) -> None:
     """The anti-windups of DESIGN beside those of others: compare.csv, compare_runs.csv."""
     from tqdm import tqdm
 
     from design.design_file import read_design
-    from experiments.asked_reference import sinusoids
+    from experiments.asked_reference import reference_of
     from experiments.comparison import comparison_tables
 
     content = read_design(design)
     limits = None if limit is None else asked_limits(limit)
     with tqdm(desc="compare", unit="", disable=None, leave=False) as bar:
-        asked = sinusoids(content, **reference)
+        asked = reference_of(content, **reference)
         write_into(output, comparison_tables(content, asked, limits, bar.update, rate_limit=rate_limit))
 
 

@@ -10,17 +10,17 @@ import pandas as pd
 
 from design.anti_windup.compensator import AntiWindup, uncertainty_cost
 from design.anti_windup.other_anti_windups import OTHERS
-from design.blocks.block import plant_block
 from design.design_file import Design
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import Run, limit_pair, simulate
 from experiments.physical_limits.least_peak_error import RestLimit
-from experiments.runs.compare_anti_windups import SETTLED, anti_windups, is_slewing, run_all, span
+from experiments.runs.compare_anti_windups import SETTLED, anti_windups, is_slewing, run_all
 from experiments.runs.design_loop import design_loop
 from experiments.runs.disturbances import Disturbances, steps
 from experiments.runs.guarantee import guarantee, sector_text
-from experiments.runs.metrics import of_table, recovery, settling_time
-from experiments.runs.references import Reference
+from experiments.runs.metrics import of_table, recovery
+from experiments.runs.references import Reference, SampledReference
+from experiments.runs.run_length import required, scale, settled_periods, span
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
@@ -28,7 +28,7 @@ MULTIPLE = 1.2  # of the control that the reference needs: the limit unless give
 PERIODS, MOST_PERIODS = 4, 40  # for each upset; more than the least where
 RECOVERIES = 3  # times the corrected anti-windup's recovery time take longer
 PULSE = 0.1  # of a period: how long the disturbance acts
-SAMPLES = 2000  # a period
+SAMPLES, ROWS = 2000, 80_000  # a period at most, and of each upset
 KEPT = 8  # of the samples every so many are written
 STEPS = 100  # of a period, of the physical limit
 SMALLER = (2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times, the reference where no run recovers
@@ -38,7 +38,7 @@ Tick = Callable[[], object]
 
 def comparison_tables(
     design: Design,
-    reference: Reference,
+    reference: Reference | SampledReference,
     limits: float | tuple[float, float] | None = None,
     tick: Tick = lambda: None,
     plant: PlantModel | None = None,
@@ -51,7 +51,7 @@ def comparison_tables(
     design
         Of either kind.
     reference
-        r(t).
+        r(t); samples count for as long as they last, and hold their last value through the disturbance.
     limits
         Of the actuator, (lower, upper), or one number for +- that; unless given, 1.2 times the most that the control
         of perfect tracking reaches.
@@ -67,7 +67,8 @@ def comparison_tables(
     dict
         ``compare``: for every anti-windup two rows. The upset ``start`` begins at rest, ``pulse`` some periods later:
         half the distance of the limits is added to the plant's input for a tenth of a period. Each counts for as
-        many periods, four or what the corrected anti-windup takes, and times count from its beginning.
+        many periods, four or what the corrected anti-windup takes, and times count from its beginning. See
+        :func:`experiments.runs.run_length.span` for what a period is.
 
         run, upset, refused
             The last is the sentence where the design has no such anti-windup; the cells after it are empty then.
@@ -77,7 +78,8 @@ def comparison_tables(
             the anti-windup is not of this form.
         recovery_s
             When |y - y0| has fallen to 1 % of the reference's amplitude for good, y0 being the output without
-            saturation and under the same disturbance; empty: not within these periods.
+            saturation and under the same disturbance; empty: not within these periods, or it has not been so for
+            the last of them (of a constant, for as long as it took).
         last_saturation_s, crossings
             Of the limits; the first is empty where u is saturated at the end.
         peak_error, from_s, least_peak_error
@@ -86,8 +88,8 @@ def comparison_tables(
         largest_control, last_error
             The greatest |u| over the larger limit, and the greatest |r - y| of the last period.
         lower_limit, limit, rate_limit, amplitude, required
-            The second is the upper limit, then come the sum of the reference's amplitudes and the most that the
-            control of perfect tracking reaches.
+            The second is the upper limit, then come the size of the reference, see
+            :func:`experiments.runs.run_length.scale`, and the most that the control of perfect tracking reaches.
         enough
             1 where a run recovers from rest; else how many times smaller the reference was when one did, the first
             power of two of those up to 64; empty: with none of them. Limits and rate limit so many times wider do the
@@ -101,16 +103,21 @@ def comparison_tables(
         The limits are not finite and in order, or perfect tracking needs no control or one without bound.
     """
     true = design.loop_plant if plant is None else plant
-    required = reference.required(true).value
-    if limits is None and not 0 < required < np.inf:
-        raise InputError(f"the control that the reference needs reaches {required:g}, from which no limit follows")
-    low, high = pair = limit_pair(MULTIPLE * required if limits is None else limits)
+    needed = required(true, reference)
+    if limits is None and not 0 < needed < np.inf:
+        raise InputError(f"the control that the reference needs reaches {needed:g}, from which no limit follows")
+    low, high = pair = limit_pair(MULTIPLE * needed if limits is None else limits)
     if not np.isfinite(high - low):
         raise InputError(f"the limits are {low:g} and {high:g}; expected finite ones")
-    period = _period(design, reference)
+    period = span(design, reference)
     recovery_s = RECOVERIES * design.corrected.judgement.recovery_s
     count = min(max(PERIODS, int(np.ceil(recovery_s / period)) + 1), MOST_PERIODS)
-    time_s = np.linspace(0.0, 2 * count * period, 2 * count * SAMPLES + 1)
+    rest = period if isinstance(reference, SampledReference) else reference.period_s
+    if not math.isfinite(rest):
+        count = max(count, settled_periods(design, reference, pair, rate_limit)[0])
+    if isinstance(reference, SampledReference):
+        count = max(count, math.ceil(float(reference.time_s[-1]) / period * (1 - 1e-12)))
+    time_s = np.linspace(0.0, 2 * count * period, 2 * count * min(SAMPLES, ROWS // count) + 1)
     begin = count * period
     disturbances = Disturbances(input=steps([((high - low) / 2, begin), (0.0, begin + PULSE * period)]))
 
@@ -124,14 +131,15 @@ def comparison_tables(
         except InputError as error:
             refused[name] = str(error)
         tick()
-    band = SETTLED * reference.amplitude
+    size = scale(reference, period)
+    band = SETTLED * size
     first = time_s <= begin
-    enough = _enough(runs, loops, pair, rate_limit, time_s[first], unsaturated[first], band, period)
+    enough = _enough(runs, loops, pair, rate_limit, time_s[first], unsaturated[first], band, rest)
     from_s, least = _least_error(true, reference, pair, period)
     rows = []
     for name in ("none", *design.anti_windup, *OTHERS):
-        known: dict[str, object] = {"lower_limit": low, "limit": high, "required": required}
-        known |= {"amplitude": reference.amplitude, "refused": refused.get(name)}
+        known: dict[str, object] = {"lower_limit": low, "limit": high, "required": needed}
+        known |= {"amplitude": size, "refused": refused.get(name)}
         known |= {"rate_limit": of_table(rate_limit), "enough": enough}
         if name in kinds:
             known |= _promised(design, kinds[name], true)
@@ -140,21 +148,13 @@ def comparison_tables(
         for upset, start_s in (("start", 0.0), ("pulse", begin)):
             row: dict[str, object] = {"run": name, "upset": upset} | known
             if name in runs:
-                row |= _row(runs[name], unsaturated, start_s, begin, period, from_s, max(-low, high), band)
+                row |= _row(runs[name], unsaturated, start_s, begin, period, from_s, max(-low, high), band, rest)
                 row |= {"least_peak_error": least if upset == "start" else np.nan}
             rows.append(row)
     series = {"time_s": time_s, "reference": reference(time_s), "output_unsaturated": unsaturated}
     for name, run in runs.items():
         series |= {f"output_{name}": run.outputs["output"], f"control_{name}": run.control}
     return {"compare": pd.DataFrame(rows), "compare_runs": pd.DataFrame(series).iloc[::KEPT]}
-
-
-def _period(design: Design, reference: Reference) -> float:
-    """The reference's period in seconds; of a constant, long enough for the loop and for the plant's own modes."""
-    if np.isfinite(reference.period_s):
-        return reference.period_s
-    rates = [-pole.real for pole in plant_block(design.loop_plant).poles if pole.real < 0]
-    return max(span(design, reference), float(np.log(1 / SETTLED)) / min(rates, default=np.inf))
 
 
 def _promised(design: Design, kind: AntiWindup | None, plant: PlantModel) -> dict[str, object]:
@@ -166,9 +166,11 @@ def _promised(design: Design, kind: AntiWindup | None, plant: PlantModel) -> dic
 
 
 def _least_error(
-    plant: PlantModel, reference: Reference, limits: tuple[float, float], period: float
+    plant: PlantModel, reference: Reference | SampledReference, limits: tuple[float, float], period: float
 ) -> tuple[float, float]:
     """From when on errors count, in seconds, and how small the greatest can be at best; NaN where it is not known."""
+    if isinstance(reference, SampledReference):
+        return period / 4, np.nan
     try:
         rest = RestLimit(plant, reference, limits, STEPS)
         index = round(rest.last / (4 * 2))
@@ -185,13 +187,13 @@ def _enough(
     time_s: np.ndarray,
     unsaturated: np.ndarray,
     band: float,
-    period: float,
+    rest: float,
 ) -> float:
     """How many times smaller the reference must be, from rest, for one of the runs to recover."""
 
     def recovers(run: Run) -> bool:
         distance = run.outputs["output"][: len(time_s)] - unsaturated
-        return not math.isnan(recovery(time_s, distance, band, period))
+        return not math.isnan(recovery(time_s, distance, band, rest))
 
     if any(recovers(run) for run in runs.values()):
         return 1.0
@@ -216,6 +218,7 @@ def _row(
     from_s: float,
     limit: float,
     band: float,
+    rest: float,
 ) -> dict[str, object]:
     end_s = start_s + length
     counts = (run.time_s >= start_s) & (run.time_s <= end_s)
@@ -224,7 +227,7 @@ def _row(
     events = run.events_s[(run.events_s >= start_s) & (run.events_s <= end_s)] - start_s
     saturated = control != run.saturated_control[counts]
     return {
-        "recovery_s": settling_time(time_s, output - unsaturated[counts], band),
+        "recovery_s": recovery(time_s, output - unsaturated[counts], band, rest),
         "last_saturation_s": np.nan if saturated[-1] else max(events, default=0.0),
         "peak_error": error[time_s >= from_s].max(),
         "from_s": from_s,

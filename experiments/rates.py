@@ -14,9 +14,10 @@ from design.blocks.block import fastest_root
 from design.design_file import Design
 from experiments.drive.judge_loop import judge_loop
 from experiments.drive.sampled_loop import METHODS, Drive, simulate_sampled
-from experiments.runs.compare_anti_windups import SETTLED, anti_windups, loops, run_all, span, usual_periods
+from experiments.runs.compare_anti_windups import SETTLED, anti_windups, loops, run_all
 from experiments.runs.metrics import of_table, over_last, settling_time
-from experiments.runs.references import Reference
+from experiments.runs.references import Reference, SampledReference
+from experiments.runs.run_length import scale, settled_periods, span
 from identification.base.errors import InputError
 
 NAMES = ("none", "corrected")
@@ -33,16 +34,20 @@ def usual_rates(design: Design) -> dict[int, float]:
     return {n: n * fastest_root(*design.controller_parts()) / math.tau for n in SAMPLES}
 
 
-def lower_rates(design: Design, reference: Reference) -> list[float]:
-    """From two samples in a period of the reference's fastest sinusoid up to the :func:`usual_rates`, in Hz."""
-    low = 2 * (max(reference.frequencies) / math.tau or 1 / span(design, reference))
+def lower_rates(design: Design, reference: Reference | SampledReference) -> list[float]:
+    """From two samples in a period of the reference's fastest sinusoid up to the :func:`usual_rates`, in Hz.
+
+    Where there is none, from one sample in the recovery time of the corrected anti-windup.
+    """
+    fastest = 0.0 if isinstance(reference, SampledReference) else max(reference.frequencies, default=0.0)
+    low = fastest / math.pi or 1 / design.corrected.judgement.recovery_s
     octaves = math.log2(min(usual_rates(design).values()) / low)
     return [low * 2 ** (k / AN_OCTAVE) for k in range(1, math.ceil(AN_OCTAVE * octaves))]
 
 
 def rates_tables(
     design: Design,
-    reference: Reference,
+    reference: Reference | SampledReference,
     limits: tuple[float, float],
     *,
     rate: float | None = None,
@@ -75,12 +80,16 @@ def rates_tables(
         ``rates``, see :func:`rows_of`, of NAMES and, at ``rate`` alone, of every anti-windup that there is. A run is
         made where its linear loop is stable (stable 1, else 0, see :func:`experiments.drive.judge_loop.judge_loop`) and
         follows in continuous time, and at ``rate``; steady_error, empty of what is not run, is no less than that of the
-        linear loop between the samples. unslewed_error is that of the run without the rate limit, at ``rate``. In every
-        row: asked_hz (empty: none), amplitude (of the reference), quantum, lower_limit, limit (the upper one), and
+        linear loop between the samples. unslewed_error is that of the run without the rate limit, at ``rate``. settled
+        is 0 for every row of a run that has not settled in continuous time, see
+        :func:`experiments.runs.run_length.settled_periods`; then its steady_error is of a transient. In every row:
+        until_s (length of a run), asked_hz (empty: none), amplitude (see :func:`experiments.runs.run_length.scale`),
+        quantum, lower_limit, limit (the upper one), and
         rate_limit (empty: none).
     """
     period, low_high = span(design, reference), dict(zip(("lower_limit", "limit"), limits, strict=True))
-    count = usual_periods(design, reference)
+    count, left = settled_periods(design, reference, limits, rate_limit)
+    size = scale(reference, period)
     time_s = np.linspace(0.0, count * period, count * ROWS + 1)
     rates = sorted({*usual_rates(design).values(), *lower_rates(design, reference), *([rate] if rate else [])})
     rows: list[dict[str, Any]] = []
@@ -95,7 +104,7 @@ def rates_tables(
     judged = {drive: _linear(design, drive, reference) for drive in drives}
     rows = [row | {"stable": 1} for row in rows]
     for name, continuous in zip(names, rows[:], strict=True):
-        follows = continuous["steady_error"] <= FOLLOWED * reference.amplitude and name in NAMES
+        follows = continuous["steady_error"] <= FOLLOWED * size and name in NAMES
         tried = [each for each in judged if name in NAMES or each.rate_hz == rate]
         ran = [each for each in tried if (follows and math.isfinite(judged[each])) or each.rate_hz == rate]
         found = dict(zip(ran, rows_of(design, reference, name, ran, time_s[-1], period, tick=tick), strict=True))
@@ -113,19 +122,25 @@ def rates_tables(
             if row["stable"]:
                 row["steady_error"] = max(row["steady_error"], judged[each])  # a NaN that comes first stays
             rows.append(row | {"unslewed_error": errors.get((each.method, each.rate_hz), math.nan)})
-    facts = {"asked_hz": rate or math.nan, "amplitude": reference.amplitude, "quantum": quantum, **low_high}
+    rows = [row | {"settled": int(row["run"] not in left)} for row in rows]
+    facts = {"asked_hz": rate or math.nan, "amplitude": size, "until_s": time_s[-1], "quantum": quantum, **low_high}
     return {"rates": pd.DataFrame(rows).assign(**facts, rate_limit=of_table(rate_limit))}
 
 
-def _linear(design: Design, drive: Drive, reference: Reference) -> float:
-    """The most that the error of the linear loop reaches between the samples, infinite where it is not stable."""
+def _linear(design: Design, drive: Drive, reference: Reference | SampledReference) -> float:
+    """The most that the error of the linear loop reaches between the samples, infinite where it is not stable.
+
+    Of samples it is that of the constant which they end as; a ramp has none but that of its constant.
+    """
+    if isinstance(reference, SampledReference):
+        reference = Reference((float(reference.values[-1]),), (0.0,), (math.pi / 2,), 0.0)
     judged = judge_loop(design, drive, omegas=reference.omegas)
     return float(np.abs(reference.amplitudes) @ judged.between_errors) / 100 if judged.stable else math.inf
 
 
 def rows_of(
     design: Design,
-    reference: Reference,
+    reference: Reference | SampledReference,
     name: str,
     drives: Iterable[Drive],
     until_s: float,
@@ -167,12 +182,14 @@ def rows_of(
     return rows
 
 
-def numbers_of(time_s: np.ndarray, error: np.ndarray, span_s: float, reference: Reference) -> dict[str, float]:
+def numbers_of(
+    time_s: np.ndarray, error: np.ndarray, span_s: float, reference: Reference | SampledReference
+) -> dict[str, float]:
     """steady_error and settling_s of a run, see :func:`rows_of`."""
     offset, ripple = over_last(time_s, error, span_s)
     return {
         "steady_error": abs(offset) + ripple,
-        "settling_s": settling_time(time_s, error - offset, SETTLED * reference.amplitude),
+        "settling_s": settling_time(time_s, error - offset, SETTLED * scale(reference, span_s)),
     }
 
 

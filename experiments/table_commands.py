@@ -14,7 +14,6 @@ from experiments.options import (
     RATE_LIMIT,
     asked_limits,
     reference_options,
-    sinusoid_options,
 )
 from experiments.pair_options import PairCommand
 from experiments.tables import write_into
@@ -43,7 +42,7 @@ def tracking_command(design: Path, limit: tuple[float, ...], rate_limit: float, 
 @DESIGN
 @AXIS
 @LIMIT_PAIR
-@sinusoid_options
+@reference_options
 @RATE_LIMIT
 @click.option("--rate", type=float, help="Of the computer in Hz, beside those that suit the controller.")
 @click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels in its unit; 0, no levels.")
@@ -63,11 +62,11 @@ def rates_command(
     from tqdm import tqdm
 
     from design.design_file import read_design
-    from experiments.asked_reference import sinusoids
+    from experiments.asked_reference import reference_of
     from experiments.rates import rates_tables
 
     limits, content = asked_limits(limit), read_design(design, "extended")
-    asked = sinusoids(content, **reference)
+    asked = reference_of(content, **reference)
     with tqdm(desc="rates", unit=" runs", disable=None, leave=False) as bar:
         tables = rates_tables(
             content,

@@ -15,19 +15,16 @@ from experiments.runs.compare_anti_windups import (
     is_slewing,
     loops,
     run_all,
-    span,
     tracking_summary,
     tracking_table,
-    usual_periods,
     verdicts,
 )
 from experiments.runs.metrics import of_table, recovery
 from experiments.runs.references import Reference, SampledReference
 from experiments.runs.region import longest_run, require_within_region
+from experiments.runs.run_length import required, scale, settled_periods, span
 from experiments.runs.sector_promise import steady_control
-from experiments.runs.steady_control import steady_constant
 
-PERIODS = 5  # of samples
 SAMPLES, LEAST, ROWS = 2000, 100, 20_000  # a period at most, a period at least, and in all
 
 
@@ -48,7 +45,7 @@ def tracking_tables(
     design
         Of either kind.
     reference
-        r(t); one of sinusoids runs for ``periods`` of the slowest, a sampled one until its last time.
+        r(t); a sampled one runs until its last time.
     limits
         Of the actuator, (lower, upper), or one number for +- that.
     names
@@ -56,8 +53,8 @@ def tracking_tables(
     rate_limit
         The most that the actuator's output changes in a second, in its unit; the controller does not know it.
     periods, samples
-        Length of a run in periods, :func:`experiments.runs.compare_anti_windups.usual_periods` unless given, and its
-        samples in each.
+        Length of a run in :func:`experiments.runs.run_length.span`, unless given until it has settled, see
+        :func:`experiments.runs.run_length.settled_periods`; and its samples in each.
 
     Returns
     -------
@@ -66,8 +63,9 @@ def tracking_tables(
         added rate_limit (empty: none), slews (1 where the actuator was too slow for the control in this run, else 0),
         recovery_s (when the output has come to within 1 % of the reference's amplitude of the loop without limits for
         good; empty: not before the last period), steady_least and steady_greatest, between which lies the control that
-        follows the reference, linear_control, the greatest \\|u\\| of the loop without limits, and span_s,
-        the length of what is called the last period.
+        follows the reference, linear_control, the greatest \\|u\\| of the loop without limits, span_s,
+        the length of what is called the last period, until_s, that of the runs, and settled (0 where the run would have
+        to last longer to be judged by its last period, else 1).
 
     Raises
     ------
@@ -77,9 +75,10 @@ def tracking_tables(
     """
     pair, plant = limit_pair(limits), design.loop_plant
     require_within_region(plant, reference, pair)
-    until, span_s = _length(design, reference, periods)
-    count = until / span_s
-    until = min(until, longest_run(plant))
+    span_s, count, left = span(design, reference), periods, frozenset[str]()
+    if count is None:
+        count, left = settled_periods(design, reference, pair, rate_limit, names)
+    until = min(count * span_s, longest_run(plant))
     samples = samples or max(min(SAMPLES, round(ROWS / count)), LEAST)
     time_s = np.linspace(0.0, until, max(round(until / span_s * samples), 2) + 1)
     every = loops(design, reference, names)
@@ -87,32 +86,20 @@ def tracking_tables(
     linear = simulate(next(iter(every.values())), (-math.inf, math.inf), time_s)
     promised = verdicts(design, every, runs, pair, reference)
     steady = steady_control(reference, plant, time_s)
-    summary = tracking_summary(runs, promised, pair, reference, _required(design, reference), span_s)
+    summary = tracking_summary(runs, promised, pair, reference, required(plant, reference), span_s)
     far = [run.outputs["output"] - linear.outputs["output"] for run in runs.values()]
+    band = SETTLED * scale(reference, span_s)
     return {
         "tracking": tracking_table(runs, reference),
         "tracking_summary": summary.assign(
             rate_limit=of_table(rate_limit),
             slews=[int(is_slewing(run)) for run in runs.values()],
-            recovery_s=[recovery(time_s, each, SETTLED * reference.amplitude, span_s) for each in far],
+            recovery_s=[recovery(time_s, each, band, span_s) for each in far],
             steady_least=float(steady.min()),
             steady_greatest=float(steady.max()),
             linear_control=float(np.abs(linear.control).max()),
             span_s=span_s,
+            until_s=until,
+            settled=[int(name not in left) for name in runs],
         ),
     }
-
-
-def _length(design: Design, reference: Reference | SampledReference, periods: int | None) -> tuple[float, float]:
-    """How long a run lasts, and how long its last period, in seconds."""
-    if isinstance(reference, SampledReference):
-        return float(reference.time_s[-1]), float(reference.time_s[-1]) / PERIODS
-    span_s = span(design, reference)
-    return (periods or usual_periods(design, reference)) * span_s, span_s
-
-
-def _required(design: Design, reference: Reference | SampledReference) -> float:
-    """The most that the control which follows the reference reaches; of samples, that of their end."""
-    if isinstance(reference, SampledReference):
-        return abs(steady_constant(design.loop_plant, float(reference.values[-1]), 0.0))
-    return reference.required(design.loop_plant).value

@@ -129,7 +129,8 @@ def campaign_table(count: int = 8) -> pd.DataFrame:
 
 def as_parquet(table: pd.DataFrame, **options: str) -> bytes:
     """The file of a campaign, sealed whatever its rows are."""
-    facts = {"plants": "8", "seed": "7", "lower_limit": "-12.5", "limit": "12.5", "rate_limit": "inf", "horizon_s": "25"}
+    facts = {"plants": "8", "seed": "7", "horizon_s": "25"}
+    facts |= {"lower_limit": "-12.5", "limit": "12.5", "rate_limit": "inf"}
     content = pyarrow.Table.from_pandas(table, preserve_index=False).replace_schema_metadata(facts)
     seal = Seal(content.schema)
     for batch in content.to_batches():

@@ -37,7 +37,8 @@ plant_options = together(
 @click.option(
     "--periods",
     type=int,
-    help="Length of a run in periods of the reference; 5 unless given, or as many as the loop takes to settle.",
+    help="Length of a run in periods of the reference; unless given 5, or as many as the loop takes, and half "
+    "as many more where it takes longer than its poles do.",
 )
 @sinusoid_options
 def campaign_command(
@@ -59,12 +60,12 @@ def campaign_command(
     from design.design_file import read_design
     from experiments.asked_reference import sinusoids
     from experiments.campaign.run_campaign import run_campaign
-    from experiments.runs.compare_anti_windups import usual_periods
+    from experiments.runs.run_length import campaign_periods
 
     limits = asked_limits(limit)
     if periods is not None and not 1 <= periods <= MOST_PERIODS:
         raise InputError(f"--periods is {periods}; expected 1 to {MOST_PERIODS}")
     content = read_design(design)
     asked = sinusoids(content, **reference)
-    length = periods or usual_periods(content, asked)
+    length = periods or campaign_periods(content, asked, limits, rate_limit)
     run_campaign(content, design, plants, seed, asked, limits, length, scheduler, output, anew, rate_limit)

@@ -15,12 +15,13 @@ from design.design_file import Design
 from experiments.campaign.draw_plants import PlantsWithin
 from experiments.campaign.linear_stability import PerturbedLoop
 from experiments.engine.simulate import DivergenceError, simulate
-from experiments.runs.compare_anti_windups import SETTLED, compensators, is_slewing, span
+from experiments.runs.compare_anti_windups import SETTLED, compensators, is_slewing
 from experiments.runs.design_loop import Controller, plant_loop, realized_controller
 from experiments.runs.guarantee import Guarantee, guarantee_within
 from experiments.runs.metrics import last_saturation, settling_time
 from experiments.runs.references import Reference
 from experiments.runs.region import require_short
+from experiments.runs.run_length import span
 from experiments.runs.sector_promise import judge_run
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
@@ -67,7 +68,7 @@ class Campaign:
 
     @property
     def span_s(self) -> float:
-        """What counts as a period, in seconds, see :func:`experiments.runs.compare_anti_windups.span`."""
+        """What counts as a period, in seconds, see :func:`experiments.runs.run_length.span`."""
         return span(self.design, self.reference)
 
     @property

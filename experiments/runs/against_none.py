@@ -15,6 +15,7 @@ from experiments.engine.simulate import DivergenceError, Run, limit_pair, limits
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference
 from experiments.runs.region import longest_run, require_within_region
+from experiments.runs.run_length import span
 from experiments.runs.sector_promise import finely
 from experiments.runs.simulate_design import SAMPLES
 from identification.base.errors import InputError
@@ -22,7 +23,7 @@ from identification.base.errors import InputError
 ROOM = 1.2
 """Limits over what the reference needs, unless limits are given."""
 BAND = 0.01  # of the reference's amplitude: nearer to the loop without limits a run has recovered
-PERIODS = 10  # of the slowest sinusoid, or recovery times of a constant; fewer where they take more than
+PERIODS = 10  # of the reference, see run_length.span; fewer where they take more than
 STEPS = 1e5  # of the engine, for one run
 WORTH = 0.1  # of BAND, and
 SAME = 1e-3  # of the other: by so much one run must be worse than another
@@ -159,7 +160,7 @@ def against_none(
 def _length(design: Design, reference: Reference) -> tuple[float, float]:
     """How long to run, and what is called the last period, in seconds."""
     recovery = design.corrected.judgement.recovery_s
-    period = reference.period_s if math.isfinite(reference.period_s) else recovery
+    period = span(design, reference)
     blocks = (plant_block(design.loop_plant), *design.controller_parts(), design.corrected.kind.one_plus)
     most = STEPS * STEP / fastest_root(*blocks)
     until = min(max(PERIODS * period, 3 * recovery), most, longest_run(design.loop_plant))

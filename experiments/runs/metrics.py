@@ -27,10 +27,14 @@ def settling_time(time_s: np.ndarray, error: np.ndarray, band: float) -> float:
     return float("nan") if outside[-1] == len(time_s) - 1 else float(time_s[outside[-1] + 1])
 
 
-def recovery(time_s: np.ndarray, distance: np.ndarray, band: float, span_s: float) -> float:
-    """The first sample time after which a distance stays within ``band``; NaN where it does not all the last span."""
+def recovery(time_s: np.ndarray, distance: np.ndarray, band: float, period_s: float) -> float:
+    """The first sample time after which a distance stays within ``band``, for a period at least; else NaN.
+
+    Where the period is infinite it stays there for as long as it took, at least.
+    """
     settled = settling_time(time_s, distance, band)
-    return settled if settled <= time_s[-1] - span_s else float("nan")
+    stays = period_s if np.isfinite(period_s) else settled - time_s[0]
+    return settled if settled + stays <= time_s[-1] * (1 + 1e-12) else float("nan")
 
 
 def of_table(rate_limit: float) -> float:

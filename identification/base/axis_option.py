@@ -28,7 +28,8 @@ class AxisOption(click.Option):
                     values.pop(other, None)
             for name in (*SINUSOIDS, "reference"):
                 if name in values and name not in options and "amplitude" in options:
-                    raise InputError(f"{path}: the reference has a {name}, which {ctx.info_name} does not take")
+                    follows = {"reference": "a file", "slope": "a ramp"}.get(name, f"a reference with a {name}")
+                    raise InputError(f"{path}: the {ctx.info_name} study is for sinusoids; this axis follows {follows}")
             ctx.default_map = {str(options[name].name): value for name, value in values.items() if name in options}
             for name in {"limit"} & values.keys() & options.keys():
                 if options[name].multiple:

@@ -48,6 +48,8 @@ def _said(summary: pd.DataFrame, run: str, unit: str) -> str:
     error = LITTLE if is_rounding(summary, run) else with_unit(abs(offset) + ripple, unit)
     last = duration(only(summary, "span_s"))
     saturated = last_saturated(of_run(summary, run, "last_saturation_s"))
+    if of_run(summary, run, "settled") == 0:
+        return f"{words}: the control {saturated}, not settled within {duration(only(summary, 'until_s'))}"
     return f"{words}: the control {saturated}, the greatest error of the last {last} is {error}"
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 
 from experiments.rates import NAMES, continuous_error, is_near, lowest_rate
 from identification.model.signals import Signals
-from paper_figures.look.captions import LITTLE, ROUNDING, a_second, hertz, only, with_unit
+from paper_figures.look.captions import LITTLE, ROUNDING, a_second, duration, hertz, only, with_unit
 
 CYCLES = 10  # times the error without the rate limit: what the rate limit makes of the loop
 METHODS = {"matched": "the method 'matched'", "tustin": "Tustin's rule", "exact": "held-input discretisation"}
@@ -92,6 +92,8 @@ def _at(rates: pd.DataFrame, run: str, rate_hz: float) -> pd.DataFrame:
 
 def _left(row: pd.Series, signals: Signals) -> str:
     error = float(row["steady_error"])
+    if row["settled"] == 0:
+        return f"not known (not settled within {duration(row['until_s'])})"
     if error < ROUNDING * float(row["amplitude"]):
         return LITTLE
     return "without bound" if math.isnan(error) else with_unit(error, signals.output_unit)

@@ -123,6 +123,8 @@ def _run(row: dict[Hashable, Any]) -> tuple[str, ...]:
     if isnan(offset):
         return name, "diverges", "", "", ""
     said = "to the end" if isnan(last) else "never" if last == 0 else number(last)
+    if row["settled"] == 0:
+        return name, said, number(largest), f"not settled within {number(row['until_s'])} s", ""
     return name, said, number(largest), number(abs(offset) + ripple), "" if isnan(percent) else number(percent)
 
 

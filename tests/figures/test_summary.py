@@ -50,7 +50,7 @@ def tracking(limits: tuple[float, float] = (-6.5, 6.5), steady: float = 4.25, la
         for run, offset in (("none", 0.75), ("corrected", 0.0))
     ]
     facts = {"lower_limit": limits[0], "limit": limits[1], "steady_least": -steady, "steady_greatest": steady}
-    return pd.DataFrame(rows).assign(**facts, linear_control=9.5, span_s=4.0)
+    return pd.DataFrame(rows).assign(**facts, linear_control=9.5, span_s=4.0, until_s=20.0, settled=1)
 
 
 def compared(none: float = 2.5, corrected: float = 1.25, enough: float = 1.0, **others: float) -> pd.DataFrame:
@@ -69,7 +69,9 @@ def rates(asked: float = NAN, **errors: list[float]) -> pd.DataFrame:
         for method, of_method in every.items()
         for rate, error in zip((100.0, 200.0, 400.0), of_method, strict=True)
     ]
-    return pd.DataFrame(rows).assign(asked_hz=asked, amplitude=10.0, quantum=0.0, rate_limit=NAN, unslewed_error=NAN)
+    return pd.DataFrame(rows).assign(
+        asked_hz=asked, amplitude=10.0, quantum=0.0, rate_limit=NAN, unslewed_error=NAN, settled=1
+    )
 
 
 RUNS = ("none", "corrected")

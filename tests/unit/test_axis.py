@@ -202,8 +202,8 @@ def test_a_command_takes_what_it_has_and_no_part_of_a_reference_is_lost(
     assert columns[:, 1] == pytest.approx(2 * np.sin(1.5 * times) + 1 + 0.5 * times, rel=1e-9)
     assert "3 rows" in invoke(*simulate, "--reference", trajectory(tmp_path))
     assert np.loadtxt(run, delimiter=",", skiprows=1)[:, 1] == pytest.approx([4.0, 4.0, 4.0])
-    said = invoke("experiments", "compare", design, "--axis", axis, "--output", tmp_path)
-    assert f"{axis}: the reference has a slope, which compare does not take" in said
+    said = invoke("experiments", "limits", design, "--axis", axis, "--output", tmp_path)
+    assert f"{axis}: the limits study is for sinusoids; this axis follows a ramp" in said
 
 
 def trajectory(folder: Path) -> Path:

@@ -17,7 +17,7 @@ from experiments.comparison import comparison_tables
 from experiments.engine.simulate import simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.disturbances import Disturbances, steps
-from experiments.runs.references import Reference, sinusoid
+from experiments.runs.references import Reference, SampledReference, sinusoid
 from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
 from identification.model.modes import Mode
@@ -71,13 +71,34 @@ def test_the_numbers_are_those_of_a_run(
     for upset, start_s in (("start", 0.0), ("pulse", begin)):
         counts = (time_s >= start_s - 1e-9) & (time_s <= start_s + 4 * PERIOD + 1e-9)
         assert rows[["lower_limit", "limit"]].loc[upset].tolist() == pytest.approx([low, limit])
-        assert rows["recovery_s"][upset] == pytest.approx(time_s[counts & away][-1] - start_s, abs=5e-3)
+        recovery = time_s[counts & away][-1] - start_s
+        if recovery > 3 * PERIOD:  # less than a period without an excursion is no recovery
+            recovery = np.nan
+        assert rows["recovery_s"][upset] == pytest.approx(recovery, abs=5e-3, nan_ok=True)
         assert rows["largest_control"][upset] == pytest.approx(np.abs(run.control[counts]).max() / limit, rel=1e-6)
         events = run.events_s[(run.events_s >= start_s) & (run.events_s <= start_s + 4 * PERIOD)]
         assert rows["crossings"][upset] == len(events) > 0
         assert rows["last_saturation_s"][upset] == pytest.approx(events[-1] - start_s)
         late = counts & (time_s >= start_s + rows["from_s"][upset] + 1e-9)
         assert rows["peak_error"][upset] == pytest.approx(np.abs(run.outputs["error"][late]).max(), rel=1e-2)
+
+
+def test_what_is_off_again_every_period_has_not_recovered(table: pd.DataFrame) -> None:
+    """The limits are 0.9 of what tracking needs: around every crest of the control no run can follow."""
+    assert table["recovery_s"].isna().all()
+
+
+def test_samples_count_for_as_long_as_they_last(late_integrator: Design) -> None:
+    """Of a step to 1 at 2 s that is held to 20 s; the disturbance comes then."""
+    samples = SampledReference(np.array([0.0, 2.0, 2.0, 20.0]), np.array([0.0, 0.0, 1.0, 1.0]))
+    tables = comparison_tables(late_integrator, samples, 0.5)
+    runs, rows = tables["compare_runs"], tables["compare"].query("run == 'corrected'").set_index("upset")
+    assert runs["time_s"].iloc[-1] == pytest.approx(40.0, rel=1e-3)
+    # y' = 2 u(t - 0.05): at the limit y takes 0.99 s to the 1 % of 0.5, and the loop without limits is there before
+    assert 2.0 + 0.99 + 0.05 < rows["recovery_s"]["start"] < 10.0
+    calm = runs[(runs["time_s"] > 0.0) & (runs["time_s"] < 2.0)]
+    assert (calm["control_corrected"] == 0).all()
+    assert runs["control_corrected"][runs["time_s"] > 20.0].abs().max() > 0.1
 
 
 def test_the_command_writes_both_tables_or_none(late_integrator: Design, tmp_path: Path) -> None:
@@ -98,7 +119,7 @@ def test_a_run_that_diverges_leaves_the_others_alone() -> None:
     table = comparison_tables(design_extended(IdentifiedModel(plant, BOUND), [1.5]), sinusoid(1.0, 1.5))["compare"]
     pulse = table[table["upset"] == "pulse"].set_index("run")
     assert np.isnan(pulse["largest_control"]["conditioning"])
-    assert np.isfinite(pulse["recovery_s"]["corrected"])
+    assert np.isfinite(pulse["last_error"]["corrected"])
 
 
 def test_a_constant_reference_leaves_the_plant_time_enough() -> None:

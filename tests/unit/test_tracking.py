@@ -14,7 +14,7 @@ from design.design_file import Design
 from experiments.__main__ import main
 from experiments.engine.simulate import simulate
 from experiments.runs.design_loop import design_loop
-from experiments.runs.references import SampledReference, sinusoid
+from experiments.runs.references import Reference, SampledReference, sinusoid
 from experiments.tracking import tracking_tables
 from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
@@ -60,6 +60,22 @@ def test_a_fast_reference_is_run_until_a_slow_loop_has_settled() -> None:
     row = tracking_tables(slow, sinusoid(1.0, 50.0, 0.3), 100.0)["tracking_summary"].iloc[0]
     assert row["relative_error_percent"] < 0.01
     assert row["last_saturation_s"] == 0
+
+
+def test_a_constant_lasts_until_the_limits_have_let_the_plant_fill() -> None:
+    """y' = 2 u(t - 0.05) comes to 10 in 10/(2 limit) seconds at the earliest, however fast the loop is."""
+    bound = AdditiveBound.printed_form(gain=0.01, corner=100.0, omega=300.0, zeta=0.1)
+    design = design_extended(IdentifiedModel(PlantModel(2.0, (), (), 0.05), bound), [0.0], 4.0)
+    reference = Reference((10.0,), (0.0,), (np.pi / 2,), 0.0)
+    filled = tracking_tables(design, reference, 0.05)["tracking_summary"].set_index("run").loc["corrected"]
+    assert filled["until_s"] - filled["span_s"] > 100.0
+    assert 100.0 * 0.99 < filled["recovery_s"] < 101.0
+    assert filled["settled"] == 1
+    assert filled["relative_error_percent"] < 0.01
+    hopeless = tracking_tables(design, reference, 1e-4)["tracking_summary"].set_index("run").loc["corrected"]
+    assert hopeless["until_s"] < 50_000.0 * 0.99
+    assert hopeless["settled"] == 0
+    assert np.isnan(hopeless["recovery_s"])
 
 
 def test_samples_end_as_a_constant_and_a_slow_actuator_has_no_promise(design: Design) -> None:
