@@ -36,7 +36,7 @@ COMMANDS = dict(every_command(main))
 def test_its_help_shows_every_default(words: tuple[str, ...]) -> None:
     """A default that the help does not show is one that enters silently."""
     shown = CliRunner().invoke(main, [*words, "-h"])
-    assert shown.exit_code == 0
+    assert shown.exit_code == 0, shown.output
     text = " ".join(shown.output.split())
     for option in (each for each in COMMANDS[words].params if isinstance(each, click.Option)):
         assert option.help, option.name
