@@ -16,7 +16,7 @@ from identification.base.console import Console
 from identification.base.errors import InputError, printable
 from identification.base.files import write_protected_too
 
-HELP = {"show_default": True, "help_option_names": ["-h", "--help"]}  # of every command
+HELP: dict[str, Any] = {"show_default": True, "help_option_names": ["-h", "--help"]}  # of every command
 QUOTED = 80  # characters of a value in a sentence
 WRITTEN = {"output", "page", "build", "responses", "record", "figure", "junit", "markdown"}
 """Options that name what a command writes."""
@@ -59,6 +59,7 @@ class CommandGroup(Console):
         click.version_option(package_name="antiwindup-thesis")(self)
 
     def add_command(self, cmd: click.Command, name: str | None = None) -> None:
+        cmd.context_settings = HELP | cmd.context_settings  # of a command that is asked without its group, too
         names = {param.name for param in cmd.params}
         if names & WRITTEN and "force" not in names:
             cmd.params.append(

@@ -381,12 +381,12 @@ def test_no_turn_of_a_long_dead_time_hides() -> None:
     ("loop", "sentence"),
     [
         (integrator(20.0, 0.1), "2 roots in the right half plane"),
-        (integrator(-1.0, 0.1), "1 roots in the right half plane"),
+        (integrator(-1.0, 0.1), "1 root in the right half plane"),
         (integrator(np.pi / 2 / 0.1, 0.1), "a root lies on the line of real part 0"),
         # a pole of the plant at 2 that the controller cancels
         (
             DelayLoop(Block(1.0, (), (0.0, 2.0)), Block(3.0, (2.0,), (-5.0,)), NONE, 0.0),
-            "1 roots in the right half plane",
+            "1 root in the right half plane",
         ),
     ],
 )
