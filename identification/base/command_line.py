@@ -59,7 +59,7 @@ class CommandGroup(Console):
         click.version_option(package_name="antiwindup-thesis")(self)
 
     def add_command(self, cmd: click.Command, name: str | None = None) -> None:
-        cmd.context_settings = HELP | cmd.context_settings  # of a command that is asked without its group, too
+        cmd.context_settings = HELP | dict(cmd.context_settings)  # of a command that is asked without its group, too
         names = {param.name for param in cmd.params}
         if names & WRITTEN and "force" not in names:
             cmd.params.append(
