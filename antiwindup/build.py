@@ -18,8 +18,9 @@ from antiwindup.output_folder import OutputFolder
 from antiwindup.steps import Step
 from antiwindup.worker import start
 from identification.base.errors import InputError
-from identification.base.files import is_folder, note, partial_file, write_whole
+from identification.base.files import is_folder, note, write_whole
 from identification.base.folder_lock import locked_folder
+from identification.base.partial_files import partial_file
 
 REFUSED, USAGE = "Error: ", "Usage: "
 
@@ -213,7 +214,7 @@ class Build:
         self._remove([step])
         self.refused[step.name] = sentence
         folder.begin(ended.source, [step.refusal])
-        write_whole({step.refusal: lambda path: path.write_text(f"{sentence}\n", encoding="utf-8")})
+        write_whole({step.refusal: f"{sentence}\n"})
         note(folder.journal, {step.refusal: step.refusal})
         folder.end([step.refusal])
         return step, ended.stage

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -51,11 +50,7 @@ def check(
     tests = read_sweeps(sweeps, Reading(**{k: v for k, v in reading.items() if v is not None}))
     found = check_model(content, tests, design)
     said = text(found)
-
-    def writer(content: str) -> Callable[[Path], object]:
-        return lambda path: path.write_text(content, encoding="utf-8")
-
-    write_whole({path: writer(made(found)) for path, made in targets.items()}, inputs)
+    write_whole({path: made(found) for path, made in targets.items()}, inputs)
     click.echo(said)
     if fails(answers(found)):
         click.get_current_context().exit(1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
 
 import click
@@ -85,10 +84,6 @@ def export(
         "fmu": lambda: fmu.files(*given),
     }
     files = writers[to]()
-    write_whole({output / file: partial(_write, content=written) for file, written in files.items()}, [design])
+    write_whole({output / file: written for file, written in files.items()}, [design])
     tested = "" if run.saturates else "; the run of its test does not saturate"
     click.echo(f"{judgement}. {controller.promise}{tested}; {', '.join(files)} -> {output}")
-
-
-def _write(path: Path, content: str | bytes) -> None:
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())

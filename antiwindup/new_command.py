@@ -22,5 +22,5 @@ def new(path: Path, force: bool) -> None:
     if not force and is_there(path):
         raise InputError(f"{path}: is there already; expected another name, or --force")
     require_writable(path)
-    write_whole({path: lambda place: place.write_text(axis_text({}, {}), encoding="utf-8")})
+    write_whole({path: axis_text({}, {})})
     click.echo(f"-> {path}: take the # away from the lines that you know")

@@ -229,7 +229,7 @@ def _coefficients(text: str, option: str) -> list[float]:
 def _finish(design: Design, model: str, output: Path, summary: str) -> None:
     compared = _compared(design)
     text = replace(design, compared=tuple(compared.splitlines())).to_json()
-    write_whole({output: lambda path: path.write_text(text, encoding="utf-8")}, inputs=[Path(model)])
+    write_whole({output: text}, inputs=[Path(model)])
     click.echo(compared)
     click.echo(f"{design.kind} design -> {output}")
     click.echo(f"  {summary}")

@@ -50,7 +50,7 @@ def axis_command(model: str, output: Path, **options: Any) -> None:
     from experiments.chosen_axis import as_table, choose_axis
     from experiments.tables import csv_writer
     from identification.base.axis_file import axis_text
-    from identification.base.files import write_whole
+    from identification.base.files import Content, write_whole
 
     given = given_keys(options)
     axis = choose_axis(asked_model(model), given)
@@ -58,15 +58,12 @@ def axis_command(model: str, output: Path, **options: Any) -> None:
     if "reference" in values:
         values["reference"] = os.path.relpath(values["reference"], output)
     notes = {name: f"CHOSEN: {setting.why}." for name, setting in axis.items() if setting.why}
-    text, table = axis_text(values, notes), csv_writer(as_table(axis))
     inputs = [Path(given["reference"])] if "reference" in given else []
-    write_whole(
-        {
-            output / "axis.toml": lambda path: path.write_text(text, encoding="utf-8"),
-            output / "axis.csv": table,
-        },
-        inputs=[Path(model), *inputs],
-    )
+    contents: dict[Path, Content] = {
+        output / "axis.toml": axis_text(values, notes),
+        output / "axis.csv": csv_writer(as_table(axis)),
+    }
+    write_whole(contents, inputs=[Path(model), *inputs])
     click.echo(f"-> {output / 'axis.toml'}")
     for name, setting in axis.items():
         if setting.why:

@@ -10,7 +10,6 @@ if __name__ == "__main__":
 
     begin()
 
-from collections.abc import Callable
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ import click
 
 from identification.base.axis_option import AXIS
 from identification.base.command_line import CommandGroup, together
-from identification.base.files import require_writable, write_whole
+from identification.base.files import Content, require_writable, write_whole
 from identification.base.path_types import FIGURE_FILE, INPUT, OUTPUT_FILE
 from identification.model.additive_bound import HIGHEST_ORDER
 
@@ -218,16 +217,15 @@ def fit(
             signals=signals,
             tick=bar.update,
         )
-    text = fitted.model.to_json()
-    writers: dict[Path, Callable[[Path], object]] = {output: lambda path: path.write_text(text, encoding="utf-8")}
+    contents: dict[Path, Content] = {output: fitted.model.to_json()}
     if responses is not None:
-        writers[responses] = lambda path: write_responses(path, fitted.tests)
+        contents[responses] = lambda path: write_responses(path, fitted.tests)
     if figure is not None:
         from paper_figures.look.bode import plot_bode
         from paper_figures.look.style import figure_writer
 
-        writers[figure] = figure_writer(plot_bode(fitted.model, fitted.tests))
-    write_whole(writers, inputs=files)
+        contents[figure] = figure_writer(plot_bode(fitted.model, fitted.tests))
+    write_whole(contents, inputs=files)
     bound = [bound_text(fitted.model.additive_bound), *bound_remarks(fitted.bound_fit)]
     of_tests = [f"{test.name}: {said}" for test in fitted.record.tests for said in (*test.remarks, *test.left_out)]
     plant = [table(fitted.plant_fit), *fitted.record.cautions]

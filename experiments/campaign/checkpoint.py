@@ -105,7 +105,7 @@ class CampaignFile:
         parquet.write_table(_table(columns), buffer)
         content, number = buffer.getvalue(), chunk[0] // CHUNK
         part = self.folder / _name(number, self._manifest, content)
-        write_whole({part: lambda partial: partial.write_bytes(content)})
+        write_whole({part: content})
         self._parts[number] = part
 
     def finish(self) -> None:
@@ -161,7 +161,7 @@ class CampaignFile:
             self.folder.mkdir(exist_ok=True)
         except OSError as error:
             raise InputError(f"{self.folder}: cannot be made ({error.strerror})") from None
-        write_whole({self.folder / MANIFEST: lambda partial: partial.write_text(self._manifest, encoding="utf-8")})
+        write_whole({self.folder / MANIFEST: self._manifest})
 
     def _claim_folder(self, anew: bool) -> None:
         if not (self.folder.is_dir() and os.access(self.folder, os.W_OK | os.X_OK)):

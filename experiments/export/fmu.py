@@ -20,7 +20,7 @@ from experiments.export.check_run import CheckRun
 from experiments.export.controller import SampledController
 from experiments.export.templates import templates
 from identification.base.errors import InputError
-from identification.base.files import partial_file
+from identification.base.partial_files import partial_file
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC")
 LIBRARIES = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("win", ".dll")}

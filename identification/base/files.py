@@ -5,24 +5,20 @@ from __future__ import annotations
 import errno
 import json
 import os
-import re
-import socket
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from hashlib import sha256
 from io import StringIO
-from itertools import count
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 
 from identification.base.errors import InputError, MissingFile
+from identification.base.partial_files import partial_file, remove_abandoned
 from identification.base.process import undisturbed
 
-_HOST = sha256(socket.gethostname().encode()).hexdigest()[:8]
-_PARTIAL = re.compile(rf"\.partial-{_HOST}-(\d+)-\d+(\..*)?")
-_numbers = count()
-_partials: set[Path] = set()
+Content = str | bytes | Callable[[Path], object]
+"""What a file is to hold, see :func:`write_whole`."""
 _journal: Path | None = None
 _protected_too: ContextVar[bool] = ContextVar("_protected_too", default=False)
 
@@ -166,40 +162,6 @@ def write_protected_too() -> Iterator[None]:
         _protected_too.reset(token)
 
 
-def remove_partials() -> None:
-    """Remove the files that this process has begun and not ended, as it is about to be ended itself."""
-    for path in tuple(_partials):
-        path.unlink(missing_ok=True)
-
-
-@contextmanager
-def removed_at_the_end(path: Path) -> Iterator[None]:
-    """Remove a file, if it is there, at the end of a ``with`` block, or when the process is ended by a signal."""
-    _partials.add(path)
-    try:
-        yield
-    finally:
-        path.unlink(missing_ok=True)
-        _partials.discard(path)
-
-
-@contextmanager
-def partial_file(folder: Path, suffix: str) -> Iterator[Path]:
-    """A new empty file in a folder, which is gone at the end unless it was renamed; a signal's handler removes it too.
-
-    Raises
-    ------
-    OSError
-        No file can be made in the folder.
-    """
-    path = folder / f".partial-{_HOST}-{os.getpid()}-{next(_numbers)}{suffix}"
-    with ExitStack() as stack:
-        with undisturbed:
-            stack.enter_context(removed_at_the_end(path))
-            path.touch(0o600, exist_ok=False)
-        yield path
-
-
 def keep_journal(journal: Path) -> None:
     """Let :func:`write_whole` note in a file, from now on, what it is about to put in which place."""
     global _journal
@@ -221,14 +183,14 @@ def noted_name(journal: Path, path: Path) -> str:
     return os.path.relpath(true_path(path.parent) / path.name, true_path(journal.parent))
 
 
-def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterable[Path] = ()) -> None:
+def write_whole(contents: Mapping[Path, Content], inputs: Iterable[Path] = ()) -> None:
     """Write several files so that either all of them appear, whole, or none does.
 
     Parameters
     ----------
-    writers
-        For each path, a function that writes the whole file to the temporary path it is given; that
-        path lies in the same folder and has the same suffix.
+    contents
+        For each path its text, its bytes, or a function that writes the whole file to the temporary path it is given;
+        that path lies in the same folder and has the same suffix.
     inputs
         Files that were read, which must not be written over.
 
@@ -238,17 +200,20 @@ def write_whole(writers: Mapping[Path, Callable[[Path], object]], inputs: Iterab
         A target is one of the inputs, is named twice, exists and is no regular file, is write-protected, or may not
         be written.
     """
-    require_writable(*writers, inputs=inputs)
-    goals = {path: true_path(path) for path in writers}
-    target = next(iter(writers), Path())
+    require_writable(*contents, inputs=inputs)
+    goals = {path: true_path(path) for path in contents}
+    target = next(iter(contents), Path())
     try:
         for folder in {goal.parent for goal in goals.values()}:
-            _remove_abandoned(folder)
+            remove_abandoned(folder)
         with ExitStack() as stack:
             partials = {}
-            for target, write in writers.items():
+            for target, content in contents.items():
                 partials[target] = stack.enter_context(partial_file(goals[target].parent, goals[target].suffix))
-                write(partials[target])
+                if callable(content):
+                    content(partials[target])
+                else:
+                    partials[target].write_bytes(content.encode() if isinstance(content, str) else content)
                 with partials[target].open("rb+") as whole:  # a power cut must not leave a name without its contents
                     os.fsync(whole.fileno())
                 partials[target].chmod(0o666 & ~_umask())
@@ -279,20 +244,3 @@ def require_replaceable(path: Path) -> None:
         raise InputError(f"{path}: cannot be written; expected a file, found something else")
     if not _protected_too.get() and not (mode & 0o222 and os.access(path, os.W_OK)):
         raise InputError(f"{path}: is write-protected; expected a file that may be replaced, or --force")
-
-
-def _remove_abandoned(folder: Path) -> None:
-    """Remove what a process of this machine, which is no more, had begun to write in a folder."""
-    for path in folder.glob(".partial-*"):
-        if (found := _PARTIAL.fullmatch(path.name)) and not _runs(int(found[1])) and S_ISREG(path.lstat().st_mode):
-            path.unlink(missing_ok=True)
-
-
-def _runs(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except OSError as error:
-        return error.errno != errno.ESRCH
-    except OverflowError:
-        return False
-    return True

@@ -11,7 +11,8 @@ from pathlib import Path
 from stat import S_ISREG
 
 from identification.base.errors import InputError
-from identification.base.files import is_folder, is_there, removed_at_the_end
+from identification.base.files import is_folder, is_there
+from identification.base.partial_files import removed_at_the_end
 
 OURS = re.compile(rb"(\d+(\n([^\n]*\n?)?)?)?")  # what a lock holds, half-written too: a process and its host
 

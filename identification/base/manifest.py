@@ -64,9 +64,7 @@ def write_manifest(folder: Path, files: Mapping[str, Written]) -> None:
     if not files:
         return path.unlink(missing_ok=True)
     content = {"schema": SCHEMA, "files": {name: vars(files[name]) for name in sorted(files)}}
-    return write_whole(
-        {path: lambda partial: partial.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")}
-    )
+    return write_whole({path: json.dumps(content, indent=1) + "\n"})
 
 
 def read_journal(path: Path) -> dict[str, set[str]]:

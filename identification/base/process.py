@@ -60,7 +60,7 @@ def end(number: int, _frame: object = None) -> None:
             signal.signal(each, signal.SIG_IGN)
         undisturbed.acquire(timeout=0.1)
         _end_children()
-        _loaded("identification.base.files", "remove_partials", list)()
+        _loaded("identification.base.partial_files", "remove_partials", list)()
     finally:
         try:
             clear = "\r\x1b[K" if sys.stderr.isatty() else ""

@@ -173,8 +173,7 @@ class Page:
         self.document.add_next_tick_callback(partial(self.saved.update, text=paragraphs(said)))
 
     def _saved(self, state: State) -> str:
-        text = self.explorer.saved(state.choices)
-        write_whole({self.output: lambda path: path.write_text(text, encoding="utf-8")}, inputs=[self.design])
+        write_whole({self.output: self.explorer.saved(state.choices)}, inputs=[self.design])
         return f"Saved: {self.output}"
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
 from io import BytesIO
 from itertools import count
 from pathlib import Path
@@ -147,8 +146,4 @@ def write(files: Mapping[Path, bytes]) -> None:
     InputError
         A folder does not exist or may not be written to.
     """
-    write_whole({path: partial(_write_bytes, content=content) for path, content in files.items()})
-
-
-def _write_bytes(path: Path, content: bytes) -> None:
-    path.write_bytes(content)
+    write_whole(files)

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from identification.base.errors import InputError
-from identification.base.files import remove_partials, write_protected_too, write_whole
+from identification.base.files import write_protected_too, write_whole
+from identification.base.partial_files import remove_partials
 
 
 def write(*paths: Path, content: str = "new") -> None:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import click
 
 from experiments.tables import csv_writer
-from identification.base.files import read_text, write_whole
+from identification.base.files import Content, read_text, write_whole
 from identification.base.path_types import INPUT_FILE, OUTPUT_FILE, OUTPUT_FOLDER
 
 
@@ -26,10 +25,10 @@ def claims_command(output: Path, page: Path | None) -> None:
     counted = record["ledger_sha256"] == quotes_sha256(ledger, read_exceptions())
     table = recompute(ledger)
     path = output / "claims.csv"
-    writers: dict[Path, Callable[[Path], object]] = {path: csv_writer(table)}
+    contents: dict[Path, Content] = {path: csv_writer(table)}
     if page:
-        writers[page] = _text_writer(claims_page(table, record, counted))
-    write_whole(writers, [LEDGER, RECORD, EXCEPTIONS])
+        contents[page] = claims_page(table, record, counted)
+    write_whole(contents, [LEDGER, RECORD, EXCEPTIONS])
     click.echo(f"{len(table)} claims -> {path}")
     for verdict, count in table["verdict"].value_counts().items():
         click.echo(f"  {verdict:17s}{count:4d}")
@@ -56,7 +55,7 @@ def coverage_command(text: Path, record: Path | None) -> None:
     covered = coverage(content, ledger, exceptions)
     counts = coverage_record(content, covered, ledger, exceptions)
     if record:
-        write_whole({record: _text_writer(json.dumps(counts, indent=2) + "\n")}, [text, LEDGER, EXCEPTIONS])
+        write_whole({record: json.dumps(counts, indent=2) + "\n"}, [text, LEDGER, EXCEPTIONS])
     click.echo(f"{text}: {counts['numbers']} numbers")
     for status, count in counts["statuses"].items():
         click.echo(f"  {status:17s}{count:4d}")
@@ -76,9 +75,5 @@ def equations_command(page: Path) -> None:
     from experiments.thesis.claims.equations_page import EQUATIONS, equations_page, read_equations
 
     table = read_equations()
-    write_whole({page: _text_writer(equations_page(table))}, [EQUATIONS])
+    write_whole({page: equations_page(table)}, [EQUATIONS])
     click.echo(f"{len(table)} labels -> {page}")
-
-
-def _text_writer(text: str) -> Callable[[Path], object]:
-    return lambda partial: partial.write_text(text, encoding="utf-8")

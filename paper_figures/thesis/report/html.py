@@ -62,7 +62,7 @@ def write_report(content: Content, build: Path, inputs: Iterable[Path]) -> Path:
         path.parent.mkdir(exist_ok=True)
     except OSError as error:
         raise InputError(f"{path.parent}: cannot be made ({error.strerror})") from None
-    write_whole({path: lambda partial: partial.write_text(page, encoding="utf-8", newline="\n")}, inputs)
+    write_whole({path: page}, inputs)
     return path
 
 
