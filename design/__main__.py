@@ -201,13 +201,14 @@ def audit_command(design: Path, windup: float, figure: Path | None) -> None:
     from design.auditing.as_text import audit_text
     from design.auditing.audit_design import audit
     from design.design_file import read_design
+    from experiments.runs.against_none import said_against_none
 
     if not abs(windup) < 1e100:
         raise InputError(f"--windup is {windup:g}; expected a number of less than 1e100")
     if figure is not None:
         require_writable(figure, inputs=[design])
     content = read_design(design)
-    said = f"{audit_text(content, audit(content), windup)}\n\n{_compared(content)}"
+    said = f"{audit_text(content, audit(content), windup)}\n\n{said_against_none(content)}"
     if figure is not None:
         from paper_figures.look.audit_sheet import plot_audit
         from paper_figures.look.style import figure_writer
@@ -227,7 +228,9 @@ def _coefficients(text: str, option: str) -> list[float]:
 
 
 def _finish(design: Design, model: str, output: Path, summary: str) -> None:
-    compared = _compared(design)
+    from experiments.runs.against_none import said_against_none
+
+    compared = said_against_none(design)
     text = replace(design, compared=tuple(compared.splitlines())).to_json()
     write_whole({output: text}, inputs=[Path(model)])
     click.echo(compared)
@@ -253,16 +256,6 @@ def _on_the_plant_with_its_dead_time(design: Design) -> str:
     return (
         f"\n  with the plant's dead time of {design.plant.delay_s:g} s, which this design ignores, the loop is {found}"
     )
-
-
-def _compared(design: Design) -> str:
-    """What each anti-windup does beside none in one run, the one that does harm first; or why there is no run."""
-    from experiments.runs.against_none import against_none
-
-    try:
-        return str(against_none(design))
-    except InputError as error:
-        return f"not compared with no anti-windup: {error}"
 
 
 if __name__ == "__main__":

@@ -112,6 +112,14 @@ class Comparison:
         return f"{recovers}, is {off}, and |u| reaches {outcome.largest_control:.3g} times the limit"
 
 
+def said_against_none(design: Design) -> str:
+    """What each anti-windup of a design does beside none in one run, a line each; or why there is no run."""
+    try:
+        return str(against_none(design))
+    except InputError as error:
+        return f"not compared with no anti-windup: {error}"
+
+
 def against_none(
     design: Design, reference: Reference | None = None, limits: tuple[float, float] | None = None
 ) -> Comparison:

@@ -18,7 +18,7 @@ from design.parameters import DelayFreeParameters
 from design.stability.characteristic_roots import roots_right_of
 from design.stability.margins import Margins, delay_loop, margins_of
 from experiments.engine.simulate import Run
-from experiments.runs.against_none import against_none
+from experiments.runs.against_none import said_against_none
 from experiments.runs.compare_anti_windups import run_all, span
 from experiments.runs.design_loop import design_loop
 from experiments.runs.guarantee import guarantee
@@ -33,6 +33,7 @@ from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 from paper_figures.explore.nyquist import Nyquist, nyquist_of
 from paper_figures.explore.state import Choices, State, TruePlant
+from paper_figures.look.stretches import merged
 
 KEPT = 32  # designs and linear loops that are remembered
 SAMPLES = 2001  # of a run
@@ -161,7 +162,7 @@ class Explorer:
         design, plant = self.designed(choices), self.true_plant(true)
         loop = delay_loop(design, plant)
         model, moved = self._step(choices, self.start.true), self._step(choices, true)
-        nyquist, unstable = nyquist_of(design, plant, loop), roots_right_of(loop, 0.0)
+        nyquist, unstable = nyquist_of(design, loop), roots_right_of(loop, 0.0)
         return Linear(nyquist, model.time_s, model.outputs["output"], moved.outputs["output"], unstable)
 
     def _step_of(self, choices: Choices, true: TruePlant) -> Run:
@@ -194,11 +195,7 @@ class Explorer:
         design = self.designed(choices)
         if design is self.file:
             return design.to_json()
-        try:
-            compared = str(against_none(design))
-        except InputError as error:
-            compared = f"not compared with no anti-windup: {error}"
-        return replace(design, compared=tuple(compared.splitlines())).to_json()
+        return replace(design, compared=tuple(said_against_none(design).splitlines())).to_json()
 
     def _margins_of(self, choices: Choices, true: TruePlant) -> Margins | str:
         design = self.designed(choices)
@@ -217,9 +214,7 @@ def saturated(run: Run) -> Real:
     first = run.control[0] != run.saturated_control[0]
     out = np.concatenate([[first], run.modes != 0])
     times = np.stack([edges[:-1][out], edges[1:][out]], axis=1)
-    apart = np.flatnonzero(times[1:, 0] - times[:-1, 1] > 2 * (run.time_s[1] - run.time_s[0]))
-    starts = times[np.concatenate([[0], apart + 1])[: len(times)], 0]
-    return np.stack([starts, times[np.append(apart, -1)[: len(times)], 1]], axis=1)
+    return merged(times, 2 * (run.time_s[1] - run.time_s[0]))
 
 
 def _settled_s(design: Design) -> float:

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.blocks.block import bound_block
 from design.blocks.frequency_peak import frequency_grid
 from design.design_file import Design
 from design.stability.delay_loop import DelayLoop
-from design.stability.margins import delay_loop
 from identification.base.arrays import Complex, Real
-from identification.model.plant import PlantModel
+from paper_figures.look.loop_curves import LoopCurves
 
 NEAR = 4.0  # modulus of L up to which discs are drawn
 FAR = 100.0  # modulus of L beyond which the curve is not drawn
@@ -38,24 +36,22 @@ class Nyquist:
     radii: Real
 
 
-def nyquist_of(design: Design, plant: PlantModel, loop: DelayLoop) -> Nyquist:
+def nyquist_of(design: Design, loop: DelayLoop) -> Nyquist:
     """The curves of L, and discs of W_a along what is near 0 of the model's.
 
     Parameters
     ----------
-    design, plant
-        The design, and the true plant.
+    design
+        The design.
     loop
-        Of both.
+        Of it and the true plant.
     """
-    W_a, model = bound_block(design.additive_bound), design.loop_plant
-    blocks = (loop.plant, delay_loop(design, model).plant, loop.forward, loop.feedback, W_a)
+    model, moved = LoopCurves.of(design), LoopCurves(loop, design.additive_bound)
+    blocks = (loop.plant, model.loop.plant, loop.forward, loop.feedback, model.W_a)
     omega = frequency_grid([root for block in blocks for root in block.zeros + block.poles])
-    s = 1j * omega
     with np.errstate(all="ignore"):  # C has poles on the axis
-        C = loop.forward(s) / (1 - loop.feedback(s) * np.exp(-loop.delay_s * s))
-        own, true = (np.where(np.abs(P(s) * C) < FAR, P(s) * C, np.nan) for P in (model, plant))
-        radii = np.abs(W_a(s) * C)
+        own, true = (np.where(np.abs(L) < FAR, L, np.nan) for L in (model.open(omega), moved.open(omega)))
+        radii = model.radius(omega)
     near = np.flatnonzero(np.abs(own) < NEAR)
     if not len(near):
         return Nyquist(own, true, omega[:0], own[:0], radii[:0])

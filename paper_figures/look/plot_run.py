@@ -18,7 +18,7 @@ from identification.base.errors import InputError
 from identification.model.signals import UNNAMED, Signals
 from paper_figures.look.frequency_axis import plain
 from paper_figures.look.panels import MOST_POINTS, band, envelope, key, paler, view
-from paper_figures.look.stretches import saturated_stretches
+from paper_figures.look.stretches import merged, saturated_stretches
 from paper_figures.look.style import FAMILY, FULL_WIDTH, LINES, panel_letters, styled
 
 AnyRun = Run | SampledRun
@@ -130,7 +130,7 @@ def _control(panel: Axes, name: str, run: AnyRun, line: Mapping[str, Any], limit
         panel.axhline(end, **LINES["saturation limits"], zorder=3, label=None if i else "limits")
     if limits is not None:
         first, last = float(run.time_s[0]), float(run.time_s[-1])
-        bars = _merged(saturated_stretches(run, limits), (last - first) / MOST_POINTS)
+        bars = merged(saturated_stretches(run, limits), (last - first) / MOST_POINTS)
         if len(bars):
             least = NARROWEST * (last - first)
             widths = np.maximum(bars[:, 1] - bars[:, 0], least)
@@ -151,15 +151,6 @@ def _swings(control: Real, limits: tuple[float, float]) -> int:
 def _line(panel: Axes, run: AnyRun, values: Real, line: Mapping[str, Any], label: str) -> None:
     """A line, thinned to its envelope; where two meet, the thin one lies upon the broad one."""
     panel.plot(*envelope(run.time_s, values), **line, label=label, zorder=3 - line["linewidth"] / 10)
-
-
-def _merged(stretches: Real, gap_s: float) -> Real:
-    """The stretches (n, 2) as they are seen: those less than a gap apart are one."""
-    if not len(stretches):
-        return stretches
-    new = np.append(True, stretches[1:, 0] - stretches[:-1, 1] > gap_s)
-    last = np.append(new[1:], True)
-    return np.column_stack([stretches[new, 0], stretches[last, 1]])
 
 
 def _signal(run: AnyRun, name: str) -> Real:
