@@ -47,7 +47,7 @@ def check(
     targets = {path: made for path, made in ((junit, files.junit), (markdown, files.markdown)) if path is not None}
     require_writable(*targets, inputs=inputs)
     content, design = asked_model(model), None if against is None else read_design(against)
-    tests = read_sweeps(sweeps, Reading(**{k: v for k, v in reading.items() if v is not None}))
+    tests = read_sweeps(sweeps, Reading.of_options(reading))
     found = check_model(content, tests, design)
     said = text(found)
     write_whole({path: made(found) for path, made in targets.items()}, inputs)

@@ -56,7 +56,6 @@ def export(
     """
     from design.design_file import read_design
     from experiments.drive.choose_method import choose_method
-    from experiments.drive.judge_loop import judge_loop
     from experiments.drive.sampled_loop import METHODS, Drive
     from experiments.export import c_code, fmu, json_file, matlab, python_file, simulink
     from experiments.export.check_run import check_run
@@ -69,10 +68,10 @@ def export(
     require_name(name)
     drive = Drive(rate, method or METHODS[0], asked_limits(limit))
     content = read_design(design)
-    drive, judgement = choose_method(content, drive, method)
-    if not judge_loop(content, drive).stable:
+    linear, judgement = choose_method(content, drive, method)
+    if not linear.stable:
         raise InputError(judgement)
-    controller = sampled_controller(content, anti_windup, drive.limits, rate, drive.method, name)
+    controller = sampled_controller(content, anti_windup, drive.limits, rate, linear.method, name)
     run, plant = check_run(content, controller), content.loop_plant
     given = (controller, run)
     writers: dict[str, Callable[[], Mapping[str, str | bytes]]] = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -223,7 +224,8 @@ def sampled_command(
     true = None if plant is None else asked_model(plant).plant
     require_within_region(true or content.loop_plant, asked, drive.limits)
     omegas = asked.frequencies if isinstance(asked, Reference) else None
-    drive, judgement = choose_method(content, drive, method, true, omegas, form)
+    linear, judgement = choose_method(content, drive, method, true, omegas, form)
+    drive = replace(drive, method=linear.method)
     click.echo(judgement)
     with tqdm(total=until * rate, desc="sampled", bar_format=SHARE, disable=None, leave=False) as bar:
         run = simulate_sampled(content, asked, kind, drive, until, true, bar.update, disturbances, form)
@@ -245,8 +247,8 @@ def sampled_command(
         from paper_figures.look.plot_run import plot_run
         from paper_figures.look.style import figure_writer
 
-        is_unstable = "the linear loop is UNSTABLE" in judgement
-        title = f"The linear loop is UNSTABLE at {rate:g} Hz with the method {drive.method}" if is_unstable else ""
+        unstable = f"The linear loop is UNSTABLE at {rate:g} Hz with the method {drive.method}"
+        title = "" if linear.stable else unstable
         writers[figure] = figure_writer(plot_run({anti_windup: run}, drive.limits, content.signals, title))
     write_whole(writers, inputs)
     click.echo(_first(promised, f"{len(run.time_s)} rows -> {output}; {len(beyond)} samples beyond the limits{last}"))

@@ -201,7 +201,7 @@ def fit(
     files = input_files(sweeps)
     require_writable(*(path for path in (output, responses, figure) if path is not None), inputs=files)
     signals = Signals(input_name, input_unit, output_name, output_unit)
-    tests = read_sweeps(sweeps, Reading(**{k: v for k, v in reading.items() if v is not None}))
+    tests = read_sweeps(sweeps, Reading.of_options(reading))
     with tqdm(desc="fits", unit="", disable=None, leave=False) as bar:
         wanted = Wanted(None if integrators == "auto" else int(integrators), modes, real)
         soft = loss == "soft-l1"

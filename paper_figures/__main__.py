@@ -17,6 +17,8 @@ import click
 from identification.base.command_line import CommandGroup
 from identification.base.path_types import INPUT, INPUT_FILE, OUTPUT_FOLDER
 
+OUTPUT = click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write to.")
+
 
 @click.group(cls=CommandGroup)
 def main() -> None:
@@ -31,7 +33,7 @@ def main() -> None:
     required=True,
     help="Folder of the tables that the experiments wrote.",
 )
-@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write to.")
+@OUTPUT
 def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
     """Draw the figures NAME..., such as fig_2_01, each as PDF, SVG and PNG with its caption as text."""
     from paper_figures.look import style
@@ -55,7 +57,7 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
     required=True,
     help="Folder of design.json, with the tables in its folder results.",
 )
-@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write to.")
+@OUTPUT
 def axis_command(names: tuple[str, ...], refit: Path, output: Path) -> None:
     """Draw NAME..., such as run or rates, of a refit: each as PDF, SVG and PNG with its caption as text."""
     from design.design_file import read_design
@@ -108,7 +110,7 @@ def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
 @main.command("bode")
 @click.argument("model", type=INPUT_FILE)
 @click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)
-@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write to.")
+@OUTPUT
 def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
     """Draw SWEEP files, MODEL and the distances under W_a: bode.pdf, .svg and .png, with a caption in bode.txt."""
     from identification.model.model_file import read_model

@@ -122,8 +122,8 @@ def choose_method(
     plant: PlantModel | None = None,
     omegas: Sequence[float] | None = None,
     form: str = FORMS[0],
-) -> tuple[Drive, str]:
-    """A drive with the best method, or with the one that is asked for, and a sentence on its linear loop.
+) -> tuple[LoopJudgement, str]:
+    """The linear loop with the best method, or with the one that is asked for, and a sentence on it.
 
     Parameters
     ----------
@@ -135,9 +135,9 @@ def choose_method(
 
     Returns
     -------
-    drive, sentence
-        The sentence says of which method the loop is stable at the rate, with which steady error; where the loop is
-        not stable with the drive's method, also from which rate on it is.
+    judgement, sentence
+        The judgement names the method. The sentence says of which method the loop is stable at the rate, with which
+        steady error; where the loop is not stable with the judged one, also from which rate on it is.
 
     Raises
     ------
@@ -159,4 +159,4 @@ def choose_method(
         sought = [first] if found[0].stable else [each for each in found if not each.refused]
         searched = (str(least_rate(design, replace(drive, method=each.method), plant, form)) for each in sought)
         said += f". It is stable with {'; '.join(searched)}"
-    return replace(drive, method=first.method), said
+    return first, said

@@ -23,8 +23,6 @@ from experiments.runs.verdict import Verdict
 from identification.base.errors import InputError
 
 SETTLED = 0.01  # band of the settling time, as a share of the reference's amplitude
-PERIODS, MOST_PERIODS = 5, 200
-REST = 1e-8  # of a mode is left once a loop counts as settled, or 1e-4 of several with one rate
 NAMES = ("none", "thesis", "corrected")
 """No anti-windup, (2.23), and the one with theta1~(0) = -1."""
 
@@ -58,14 +56,6 @@ def span(design: Design, reference: Reference) -> float:
     if np.isfinite(reference.period_s):
         return reference.period_s
     return 2 * design.corrected.judgement.recovery_s
-
-
-def usual_periods(design: Design, reference: Reference) -> int:
-    """How many of :func:`span` a run lasts: five, or as many as the loop takes to settle, and one more."""
-    poles = design.blocks["T_so"].poles if design.hinf is None else ()
-    slowest = min((-pole.real for pole in poles), default=math.inf) if design.hinf is None else design.hinf.decay_rate
-    settled = math.log(1 / REST) / slowest / span(design, reference)
-    return min(max(PERIODS, math.ceil(settled) + 1), MOST_PERIODS)
 
 
 def run_all(

@@ -10,13 +10,15 @@ import numpy as np
 from design.blocks.block import plant_block
 from design.design_file import Design
 from experiments.engine.simulate import Run, simulate
-from experiments.runs.compare_anti_windups import MOST_PERIODS, NAMES, PERIODS, SETTLED, loops, run_all, usual_periods
+from experiments.runs.compare_anti_windups import NAMES, SETTLED, loops, run_all
 from experiments.runs.compare_anti_windups import span as loop_span
 from experiments.runs.references import Reference, SampledReference
 from experiments.runs.region import longest_run
 from experiments.runs.steady_control import steady_constant
 from identification.model.plant import PlantModel
 
+PERIODS, MOST_PERIODS = 5, 200
+REST = 1e-8  # of a mode is left once a loop counts as settled, or 1e-4 of several with one rate
 TIMES = 64  # the loop's own span, or its usual periods: no more is waited for the plant, or for the limits
 SAMPLES = 100  # a span
 LEFT = 0.01  # of the plant's slowest mode, after the span of a constant
@@ -73,10 +75,10 @@ def settled_periods(
     Returns
     -------
     int, frozenset
-        Samples last as long as they do. Else it is :func:`experiments.runs.compare_anti_windups.usual_periods` of that
-        span; where the limits hold the control that follows the reference, it is doubled, up to 64 times, until every
-        run has settled. One has where all through its last span it is within 1 % of :func:`scale` of the loop without
-        limits; or where it cycles: its error moves by more, and its extremes are those of the span that ends half way.
+        Samples last as long as they do. Else it is five, or as many as the loop takes to settle and one more; where the
+        limits hold the control that follows the reference, it is doubled, up to 64 times, until every run has settled.
+        One has where all through its last span it is within 1 % of :func:`scale` of the loop without limits; or where
+        it cycles: its error moves by more, and its extremes are those of the span that ends half way.
     """
     if isinstance(reference, SampledReference) and reference.time_s[-1] > 0:
         return PERIODS, frozenset()
@@ -106,10 +108,14 @@ def campaign_periods(
 
 
 def _usual(design: Design, reference: Reference | SampledReference, span_s: float) -> int:
+    """Five, or as many as the loop takes to settle, in its own spans, and one of these more."""
     if isinstance(reference, SampledReference):
         return PERIODS
     own = loop_span(design, reference)
-    return min(max(PERIODS, math.ceil(usual_periods(design, reference) * own / span_s)), MOST_PERIODS)
+    poles = design.blocks["T_so"].poles if design.hinf is None else ()
+    slowest = min((-pole.real for pole in poles), default=math.inf) if design.hinf is None else design.hinf.decay_rate
+    periods = min(max(PERIODS, math.ceil(math.log(1 / REST) / slowest / own) + 1), MOST_PERIODS)
+    return min(max(PERIODS, math.ceil(periods * own / span_s)), MOST_PERIODS)
 
 
 def _suffice(design: Design, reference: Reference | SampledReference, limits: tuple[float, float]) -> bool:

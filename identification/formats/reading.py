@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from identification.base.errors import InputError
 from identification.formats.columns import KNOWN, quoted
@@ -34,6 +35,11 @@ class Reading:
     node: int | None = None
     direction: int | None = None
     resample: bool = False
+
+    @classmethod
+    def of_options(cls, options: Mapping[str, Any]) -> Reading:
+        """What the options of a command say, those that were not given being None."""
+        return cls(**{name: value for name, value in options.items() if value is not None})
 
     def __post_init__(self) -> None:
         if unknown := sorted({*self.columns.values()} - KNOWN):

@@ -39,7 +39,9 @@ def advice(model: IdentifiedModel, found: Found) -> tuple[Paragraph, ...]:
     found
         What was made for it so far.
     """
-    do, do_not = list(_do(found, model.signals)), list(_do_not(found, model.signals))
+    delay_free = found.design("design_delay_free")
+    unusable = "" if delay_free is None else _unusable(delay_free)
+    do, do_not = list(_do(found, unusable, model.signals)), list(_do_not(found, unusable, model.signals))
     parts = (
         ("Do", do),
         ("Avoid", do_not),
@@ -50,7 +52,7 @@ def advice(model: IdentifiedModel, found: Found) -> tuple[Paragraph, ...]:
     return tuple((head, " ".join(sentences)) for head, sentences in parts if sentences)
 
 
-def _do(found: Found, signals: Signals) -> Iterator[str]:
+def _do(found: Found, unusable: str, signals: Signals) -> Iterator[str]:
     design = found.design("design")
     if design is None:
         return
@@ -62,20 +64,19 @@ def _do(found: Found, signals: Signals) -> Iterator[str]:
     if rates is not None:
         yield from discretise(rates, best, signals)
     delay_free = found.design("design_delay_free")
-    if delay_free is not None and not _unusable(delay_free):
+    if delay_free is not None and not unusable:
         late = f"with the plant's dead time of {duration(delay_free.plant.delay_s)}" if delay_free.plant.delay_s else ""
         yield f"The loop with the controller of design_delay_free.json is stable {late or 'around this plant'} too."
 
 
-def _do_not(found: Found, signals: Signals) -> Iterator[str]:
-    design, delay_free = found.design("design"), found.design("design_delay_free")
+def _do_not(found: Found, unusable: str, signals: Signals) -> Iterator[str]:
     rates = found.made.get("rates")
-    if design is not None:
+    if found.design("design") is not None:
         yield from use_not(found, signals)
         if rates is not None:
             yield from avoid(rates, best_anti_windup(found), signals)
-    if delay_free is not None and (why := _unusable(delay_free)):
-        yield f"Do not use the controller of design_delay_free.json: {why}."
+    if unusable:
+        yield f"Do not use the controller of design_delay_free.json: {unusable}."
 
 
 def _unusable(delay_free: Design) -> str:
