@@ -15,8 +15,9 @@ from typing import Any
 
 import click
 
-from experiments.campaign.run_plants import CHUNK, Campaign, Columns
+from experiments.campaign.run_plants import CHUNK, Campaign, Chunk, Columns
 from experiments.campaign.seal import SEAL, Seal
+from experiments.runs.code_hash import DISTRIBUTION, code_sha256
 from identification.base.errors import InputError
 from identification.base.files import read_bytes, read_text, require_writable, write_whole
 
@@ -25,7 +26,7 @@ PARTIAL = ".partial-"  # of a command that was killed while it wrote
 PART = re.compile(r"part-(\d+)-[0-9a-f]{64}\.parquet")
 PARTS_A_GROUP = 80  # of the file's row groups: 6000 rows
 SYNTHETIC = "plants drawn at random inside W_a, not measured"
-PACKAGES = ("antiwindup-thesis", "numpy", "scipy", "numba", "pyarrow")
+PACKAGES = (DISTRIBUTION, "numpy", "scipy", "numba", "pyarrow")
 TOLD = ("synthetic", "kind", "design_sha256", "seed", "plants", "lower_limit", "limit", "rate_limit", "horizon_s")
 """What the file's metadata say."""
 TEXTS, WHOLE, FLAGS = ("anti_windup",), ("plant", "events"), ("linear_stable", "diverged", "covered")
@@ -75,13 +76,13 @@ class CampaignFile:
             "rate_limit": campaign.rate_limit,
             "horizon_s": campaign.horizon_s,
             "chunk": CHUNK,
-            "code_sha256": campaign.code_sha256,
+            "code_sha256": code_sha256(),
             "versions": {name: version(name) for name in PACKAGES},
         }
         self._manifest = json.dumps(self._facts, indent=2) + "\n"
         self._metadata = {name: str(self._facts[name]) for name in TOLD} | {
             "design": source.name,
-            "version": str(version(PACKAGES[0])),
+            "version": version(DISTRIBUTION),
         }
         require_writable(output, inputs=[source])
         self._parts: dict[int, Path] = {}
@@ -90,12 +91,12 @@ class CampaignFile:
             self._parts = self._parts_of(self._manifest)
 
     @property
-    def missing(self) -> list[tuple[int, int]]:
+    def missing(self) -> list[Chunk]:
         """The chunks of which there is no part that is whole, see :func:`experiments.campaign.run_plants.run_chunk`."""
         firsts = (first for first in range(0, self._plants, CHUNK) if first // CHUNK not in self._parts)
         return [(first, min(first + CHUNK, self._plants)) for first in firsts]
 
-    def keep(self, chunk: tuple[int, int], columns: Columns) -> None:
+    def keep(self, chunk: Chunk, columns: Columns) -> None:
         """Write the part of one chunk."""
         from pyarrow import parquet
 

@@ -101,8 +101,8 @@ def run(tree: Path, code: str, **environment: str) -> list[str]:
 def test_an_edit_in_a_wing_changes_what_the_code_is_known_by(tree: Path, tmp_path: Path) -> None:
     """Else a compiled function would run as it was before, and a campaign go on with other code."""
     code = (
-        "import experiments.campaign.run_plants as r; from identification.base.compiled import code_cache;"
-        "print(code_cache('experiments'), r.code_sha256())"
+        "import experiments.engine.integrator; from experiments.runs.code_hash import code_sha256;"
+        "from identification.base.compiled import code_cache; print(code_cache('experiments'), code_sha256())"
     )
 
     def digests() -> list[str]:

@@ -27,7 +27,7 @@ from experiments.__main__ import main
 from experiments.campaign import checkpoint
 from experiments.campaign.draw_plants import PlantsWithin
 from experiments.campaign.linear_stability import PerturbedLoop
-from experiments.campaign.run_plants import Campaign, code_sha256, run_chunk
+from experiments.campaign.run_plants import Campaign, run_chunk
 from experiments.engine.simulate import simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.guarantee import guarantee_within
@@ -129,11 +129,11 @@ def test_another_integrator_or_unstable_pole_is_refused(extended_design: Design)
 @pytest.fixture(scope="module")
 def campaign(extended_design: Design) -> Campaign:
     reference = thesis_reference("extended", extended_design.reference_omegas)
-    return Campaign(extended_design, "of a test", 1, reference, (-LIMIT, LIMIT), 5, code_sha256())
+    return Campaign(extended_design, "of a test", 1, reference, (-LIMIT, LIMIT), 5)
 
 
 def test_rows_are_those_of_single_runs(campaign: Campaign, extended_design: Design) -> None:
-    columns = run_chunk(campaign, 3, 4)
+    columns = run_chunk(campaign, (3, 4))
     plant = PlantsWithin(extended_design.loop_plant, extended_design.additive_bound).draw(1, 3)
     assert columns["plant"] == [3, 3, 3]
     assert columns["anti_windup"] == ["none", "thesis", "corrected"]
@@ -164,13 +164,8 @@ def test_rows_are_those_of_single_runs(campaign: Campaign, extended_design: Desi
 
 
 def test_a_plant_is_the_same_in_every_chunk(campaign: Campaign) -> None:
-    together, apart = run_chunk(campaign, 4, 6), [run_chunk(campaign, index, index + 1) for index in (5, 4)]
+    together, apart = run_chunk(campaign, (4, 6)), [run_chunk(campaign, (index, index + 1)) for index in (5, 4)]
     assert together == {name: apart[1][name] + apart[0][name] for name in together}
-
-
-def test_other_code_than_the_commands_is_refused(campaign: Campaign) -> None:
-    with pytest.raises(InputError, match="other code"):
-        run_chunk(replace(campaign, code_sha256="0"), 0, 1)
 
 
 def test_a_run_that_diverges_is_a_result(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -180,7 +175,7 @@ def test_a_run_that_diverges_is_a_result(campaign: Campaign, monkeypatch: pytest
         raise module.DivergenceError(1.0)
 
     monkeypatch.setattr(module, "simulate", diverges)
-    columns = run_chunk(campaign, 0, 1)
+    columns = run_chunk(campaign, (0, 1))
     assert columns["diverged"] == [True] * 3
     for name in ("peak_error", "steady_error", "recovery_s", "last_saturation_s", "events", "needed_sector"):
         assert columns[name] == [None] * 3
@@ -191,7 +186,7 @@ def test_a_run_that_diverges_is_a_result(campaign: Campaign, monkeypatch: pytest
 def test_a_guarantee_within_the_bound_covers_the_runs_that_need_less(table: IdentifiedModel, limit: float) -> None:
     design = design_extended(table, [1.5], 4.0, [(2.0, 1.0)])
     kind, reference = design.compensator("corrected"), thesis_reference("extended", (1.5,))
-    columns = run_chunk(Campaign(design, f"robust {limit}", 1, reference, (-limit, limit), 5, code_sha256()), 0, 2)
+    columns = run_chunk(Campaign(design, f"robust {limit}", 1, reference, (-limit, limit), 5), (0, 2))
     assert columns["guaranteed_sector"] == [0, 0, guarantee_within(design, kind).sector] * 2
     for index, row in ((0, 2), (1, 5)):
         plant = PlantsWithin(design.loop_plant, design.additive_bound).draw(1, index).plant
@@ -212,8 +207,8 @@ def test_a_guarantee_within_the_bound_covers_the_runs_that_need_less(table: Iden
 def test_a_chapter_2_design_runs_too(delay_free_design: Design) -> None:
     """No dead time in its loop: that of the true plant may only grow."""
     reference = thesis_reference("delay-free", delay_free_design.reference_omegas)
-    campaign = Campaign(delay_free_design, "another", 2, reference, (-10.0, 10.0), 6, code_sha256())
-    columns = run_chunk(campaign, 1, 2)
+    campaign = Campaign(delay_free_design, "another", 2, reference, (-10.0, 10.0), 6)
+    columns = run_chunk(campaign, (1, 2))
     assert columns["delay_s"][0] >= 0
     assert columns["zero_omega_1"][0] != delay_free_design.plant.zero_modes[0].omega
     assert campaign.horizon_s == pytest.approx(24.0)
@@ -339,11 +334,11 @@ def test_a_scheduler_that_dies_leaves_what_is_done(folder: Path) -> None:
     parts, address = folder / "left.parquet.parts", folder / "scheduler.json"
     dask = [sys.executable, "-m", "dask"]
     at = ["--scheduler-file", str(address), "--no-dashboard"]
-    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
+    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": ROOT}
     worker_options = ["--nthreads", "1", "--no-nanny", "--death-timeout", "1"]
     with (
         subprocess.Popen([*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", *at], **quiet) as scheduler,
-        subprocess.Popen([*dask, "worker", *worker_options, *at], **quiet | {"cwd": ROOT}) as worker,
+        subprocess.Popen([*dask, "worker", *worker_options, *at], **quiet) as worker,
     ):
 
         def lose_it() -> None:
