@@ -41,7 +41,7 @@ from identification.model.plant import PlantModel
 A_EXCURSION = 64  # samples of u between two crossings of the limits, at least
 A_TIME_CONSTANT = 10  # samples of u beyond the limits in the loop's shortest time constant
 REFINEMENTS = 8  # of the samples around the largest u and secant, and around where the guarantee is left
-A_REFINEMENT = 33  # samples of each, in place of three
+A_REFINEMENT = 1025  # samples of each, in place of three: twice so refined, a peak is as near as rounding shows
 A_PERIOD = 200  # samples of v_s in a period of the reference
 MOST_SAMPLES = 1e6
 EVENLY = 50_001  # samples of v for the bound on the windup
