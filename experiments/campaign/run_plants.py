@@ -25,7 +25,6 @@ from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
 SAMPLES_PER_PERIOD = 500
-CHUNK = 25  # plants that one task runs
 MEASURED = ("peak_error", "steady_error", "recovery_s", "last_saturation_s", "events")  # of a run that does not diverge
 
 Chunk = tuple[int, int]

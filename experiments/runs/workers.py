@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -25,6 +27,7 @@ Done = Generator[tuple[int, Result], None, None]
 AHEAD = 2  # pieces a core that run or wait
 PATIENCE_S = 5  # to reach a scheduler, and its first worker
 RETRIES = 2
+COUNTED_S = 1  # how often the cluster is asked for its cores, which costs as much as a piece does
 
 
 class WorkersLostError(InputError):
@@ -155,10 +158,11 @@ def _run_on(address: str, work: Callable[[Item], Result], items: Iterable[Item])
             raise InputError(f"--scheduler {address}: the scheduler has no workers; expected one or more") from None
         waiting = enumerate(items)
         running: dict[Any, int] = {}
-        done = as_completed(loop=client.loop)
+        done, counted_at_s = as_completed(loop=client.loop), -math.inf
         try:
             while True:
-                most = AHEAD * max(sum(client.nthreads().values()), 1)
+                if time.monotonic() > counted_at_s + COUNTED_S:
+                    most, counted_at_s = AHEAD * max(sum(client.nthreads().values()), 1), time.monotonic()
                 while len(running) < most and (following := next(waiting, None)) is not None:
                     future = client.submit(work, following[1], pure=False, retries=RETRIES)
                     running[future] = following[0]

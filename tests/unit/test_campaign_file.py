@@ -106,7 +106,7 @@ def test_a_part_with_any_bit_changed_runs_again(campaign: Campaign, design: Path
     file = kept(tmp_path / "damaged.parquet", campaign, design)
     part = min(file.folder.glob("part-*"))
     whole, rng = part.read_bytes(), np.random.default_rng(2)
-    for place in rng.integers(len(whole), size=300):
+    for place in rng.integers(len(whole), size=40):
         damaged = bytearray(whole)
         damaged[place] ^= 1 << rng.integers(8)
         part.write_bytes(damaged)
@@ -119,6 +119,12 @@ def test_a_part_with_any_bit_changed_runs_again(campaign: Campaign, design: Path
     alone.finish()
     assert again.output.read_bytes() == alone.output.read_bytes()
     assert not again.folder.exists()
+
+
+def test_the_parts_of_a_large_campaign_are_fewer_and_larger(campaign: Campaign, design: Path, tmp_path: Path) -> None:
+    missing = CampaignFile(tmp_path / "large.parquet", campaign, 10**6 + 1, design).missing
+    assert [missing[0], missing[-1]] == [(0, 250), (10**6, 10**6 + 1)]
+    assert len(missing) == 4001
 
 
 def test_a_part_of_another_campaign_is_none_of_this(campaign: Campaign, design: Path, tmp_path: Path) -> None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 
+import psutil
 import pytest
 
 from experiments.engine.simulate import limit_pair
@@ -28,6 +31,21 @@ def test_what_the_work_refuses_is_said() -> None:
 def test_a_process_that_is_killed_is_said() -> None:
     with pytest.raises(WorkersLostError, match="a process that computed was killed"):
         gathered(os._exit, [1])
+
+
+def test_no_process_outlives_a_command_that_is_killed() -> None:
+    code = (
+        "import time; from experiments.runs.workers import spread; work = spread(time.sleep, [0.0] + 9 * [60.0]);"
+        "next(work); print('begun', flush=True); next(work)"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as command:
+        assert command.stdout is not None
+        assert command.stdout.readline() == b"begun\n"
+        workers = psutil.Process(command.pid).children(recursive=True)
+        command.kill()
+    assert workers
+    left = psutil.wait_procs(workers, timeout=2)[1]
+    assert {process.status() for process in left} <= {psutil.STATUS_ZOMBIE}  # which nobody has taken note of
 
 
 @pytest.mark.parametrize("name", ["code", "numpy"])
