@@ -33,7 +33,7 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return inputs(tmp_path_factory.mktemp("inputs"))
 
 
-@pytest.mark.parametrize(("command", "name"), zip(COMMANDS, cycle(SIGNALS), strict=False))
+@pytest.mark.parametrize(("command", "name"), list(zip(COMMANDS, cycle(SIGNALS), strict=False)))
 def test_a_signal_ends_a_command(command: str, name: str, given: dict[str, str]) -> None:
     """Each by one of the signals, whose handlers are the same of all; ``make faults`` sends each all of them."""
     after_s = LATEST_S * random.Random(f"{command} {name}").random() ** 2  # many while it imports
