@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -11,6 +11,7 @@ import clarabel
 import numpy as np
 import scipy.sparse as sparse
 
+from experiments.physical_limits.averages import average, best, spread
 from experiments.physical_limits.certificates import Samples, forced, reached, whole
 from experiments.physical_limits.exact_chain import fastest
 from experiments.physical_limits.intervals import Interval, outward
@@ -23,13 +24,12 @@ SAMPLES = 4  # times in a step at which the program knows the error; one, its mi
 REFINED = 4  # parts of a step, each with a value of u of its own, near the time from which the error counts
 GRAINS = SAMPLES * REFINED  # of a step: at whole ones lie the samples of a part
 NEAR = (20, 2)  # steps before and after that time that are refined
-PHASE = 0.3  # most that the fastest pole turns or decays within a cell, rad
+PHASE = 0.6  # most that the fastest pole turns or decays within a cell, rad
 WIDTHS = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0)  # of the averages that are tried, in steps
-PATIENCE = 2  # wider averages in a row that are no better, after which none is tried
-PASSES = 3  # three boxes in a row are a smooth bell
 SPARE = 6  # steps at the end of a start from rest that only serve the averages
 LOST = 1e-3  # of the weights may lie beyond the time to which the error counts, or that much of r is hardly an error
 MOST_CELLS = 2_000_000
+SOLVED = 1e-6  # to this share of r the program is; what that leaves open, the bounds count
 GRAIN = 1e-8  # of the distance of the limits, more than a grain in so many cells
 
 
@@ -153,19 +153,24 @@ class PeakProgram:
         gain, shares = size / scale, (limits[0] / size, limits[1] / size)
         u, mu = self._optimum(r.values, gain, shares, slice(first, len(values)))
         cells, more = self._cells, gain * (1 + 2 * UNIT)
-        controls = (whole(self._average(u, width, first), self._centred) for width in WIDTHS)
-        upper = -_best(-reached(cells, control, r, more, counted) for control in controls)
+        controls = (whole(average(u, self._half(width), first, self.periodic), self._centred) for width in WIDTHS)
+        upper = -best(-reached(cells, control, r, more, counted) for control in controls)
         weighed = slice(first, self.counted - (cells.jumps and not self.periodic))
         if upper > LOST and np.abs(mu[weighed.stop :]).sum() > LOST * np.abs(mu).sum():
             _, mu = self._optimum(r.values, gain, shares, weighed)
         weights = (self._weights(mu, width, weighed) for width in WIDTHS if mu[weighed].any())
-        lower = _best(forced(cells, each, r, more, shares) for each in weights)
+        lower = best(forced(cells, each, r, more, shares) for each in weights)
         return outward(scale * max(0.0, lower), scale * upper)
 
     def _weights(self, mu: np.ndarray, width: float, counted: slice) -> np.ndarray:
         """Averaged weights for :func:`experiments.physical_limits.certificates.forced`, none at the end of the span."""
-        weights = self._average(mu, width, 0) if self.periodic else self._spread(mu, width, counted)
+        half = self._half(width)
+        weights = average(mu, half, 0, periodic=True) if self.periodic else spread(mu, half, counted)
         return whole(weights / np.abs(weights).sum(), self._centred)
+
+    def _half(self, width: float) -> int:
+        """Cells to either side of one, of an average as wide as so many steps."""
+        return int(width * self.fineness / 2)
 
     def _edges(self, first: int) -> np.ndarray:
         """Where the steps begin and end, in cells; from rest they are refined near ``first``."""
@@ -219,6 +224,7 @@ class PeakProgram:
         matrix = _of_blocks(blocks)[:, 0 if self.periodic else n :]
         settings = clarabel.DefaultSettings()
         settings.verbose = False
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = SOLVED
         solution = clarabel.DefaultSolver(
             sparse.csc_matrix((matrix.shape[1], matrix.shape[1])),
             np.append(np.zeros(matrix.shape[1] - 1), 1.0),
@@ -251,43 +257,6 @@ class PeakProgram:
         for _ in range(GRAINS):
             flows.append(grain @ flows[-1])
         return np.array(flows)[:, :n]
-
-    def _average(self, values: np.ndarray, width: float, first: int) -> np.ndarray:
-        """Repeated moving averages, from ``first`` on, of values in the cells or, if periodic, at their ends.
-
-        Where there is no period to go on with, the values are mirrored at both ends.
-        """
-        half, later = int(width * self.fineness / 2), values[first:]
-        for _ in range(PASSES):
-            total = np.append(0.0, np.cumsum(np.pad(later, half, mode="wrap" if self.periodic else "symmetric")))
-            later = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-        return np.append(values[:first], later)
-
-    def _spread(self, mu: np.ndarray, width: float, counted: slice) -> np.ndarray:
-        """The weights that count, each spread evenly to both sides, again and again, as far as the ends allow.
-
-        That keeps their sum and their mean time, and so the costates of two integrators before them.
-        """
-        weights, later = np.zeros_like(mu), mu[counted]
-        place = np.arange(len(later))
-        half = np.minimum(int(width * self.fineness / 2), np.minimum(place, place[::-1]))
-        for _ in range(PASSES):
-            rises = np.bincount(place - half, later / (2 * half + 1), len(later) + 1)
-            falls = np.bincount(place + half + 1, later / (2 * half + 1), len(later) + 1)
-            later = np.cumsum(rises - falls)[:-1]
-        weights[counted] = later
-        return weights
-
-
-def _best(bounds: Iterator[float]) -> float:
-    """The greatest of bounds, of which no more are asked for when two in a row were no better; 0 of none."""
-    best = next(bounds, 0.0)
-    worse = 0
-    for bound in bounds:
-        best, worse = max(best, bound), 0 if bound > best else worse + 1
-        if worse == PATIENCE:
-            break
-    return best
 
 
 def _of_blocks(blocks: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> sparse.csc_matrix:
