@@ -46,8 +46,9 @@ def guesses(
     Notes
     -----
     Sanathanan-Koerner iterations for all delays of a grid about the likely ones: (j omega)^q e^{j omega h} H is fitted
-    by N/D of the structure's degrees, D's leading coefficient 1, in Chebyshev polynomials of omega^2 (even and odd powers of
-    j omega apart). Poles in the right half plane are reflected, and zeros are as far as the structure has fewer there.
+    by N/D of the structure's degrees, D's leading coefficient 1, in Chebyshev polynomials of omega^2 (even and odd
+    powers of j omega apart). Poles in the right half plane are reflected, and zeros are as far as the structure has
+    fewer there.
     """
     delays, costs, best = _rational_fits(omega, response, sigma, likely_delays, structure)
     # dead times of a turn or more are tried only where shorter ones fail: noise must not choose among turns
