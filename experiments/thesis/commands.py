@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from experiments.campaign.command import plant_options
-from experiments.options import DESIGN, OUTPUT_FOLDER, positive_limit
+from experiments.options import DESIGN, OUTPUT_FOLDER, SCHEDULER, positive_limit
 from experiments.tables import write_into
 from experiments.thesis.claims.commands import claims_command, coverage_command, equations_command
 from identification.base.command_line import CommandGroup
@@ -133,15 +133,20 @@ def limits(design: Path, output: Path) -> None:
 
 
 @thesis.command("conditions")
+@SCHEDULER
 @OUTPUT_FOLDER
-def conditions(output: Path) -> None:
+def conditions(scheduler: str | None, output: Path) -> None:
     """What the thesis does not print, searched by what it does: conditions.csv, conditions_summary.csv."""
+    from functools import partial
+
     from tqdm import tqdm
 
+    from experiments.runs.batch import on_cluster, threaded
     from experiments.thesis.unprinted.search import conditions_tables
 
     with tqdm(desc="conditions", unit="", disable=None, leave=False) as bar:
-        write_into(output, conditions_tables(tick=bar.update))
+        there = partial(on_cluster, scheduler=scheduler) if scheduler else threaded
+        write_into(output, conditions_tables(each=partial(there, tick=bar.update)))
 
 
 @thesis.command("sampled-rates")
