@@ -12,6 +12,7 @@ from design.blocks.block import bound_block
 from design.blocks.frequency_peak import frequency_grid, searched_norm
 from identification.model.additive_bound import AdditiveBound
 
+MOST = 50  # parabolas; some five are enough
 EXCHANGED = 1e-9  # by which the square of the least f exceeds its lower bound, relative
 
 
@@ -45,20 +46,22 @@ def _minimise(cost: Callable[[float], float], upper: float, tolerance: float) ->
         upper *= 4
 
 
-def _exchanged(highest: Callable[[float], tuple[complex, complex]], gamma: float) -> float:
-    """The least over gamma >= -1 of the largest |w + gamma v| over omega; ``highest`` gives w and v where it lies.
+def _exchanged(highest: Callable[[float], tuple[complex, complex]], gamma: float) -> tuple[float, float]:
+    """The gamma >= -1 of the least largest |w + gamma v| over omega, and that; ``highest`` gives w and v where it lies.
 
     Each |w + gamma v|^2 is a parabola in gamma, below which no largest one falls. Where the highest of those known is
-    lowest the next is asked for, until it is no higher; ``gamma`` is the first.
+    lowest the next is asked for, until it is no higher or there are :data:`MOST`; ``gamma`` is the first.
     """
-    squares, least = np.empty((0, 3)), np.inf
-    while True:
+    squares, best, least = np.empty((0, 3)), gamma, np.inf
+    for _ in range(MOST):
         w, v = highest(gamma)
-        least = min(least, abs(w + gamma * v))
+        if abs(w + gamma * v) < least:
+            best, least = gamma, abs(w + gamma * v)
         squares = np.vstack([squares, [abs(v) ** 2, 2 * (w * v.conjugate()).real, abs(w) ** 2]])
         gamma, below = _lowest(squares)
         if least**2 <= below * (1 + EXCHANGED):
-            return least
+            break
+    return best, least
 
 
 def _lowest(squares: np.ndarray) -> tuple[float, float]:
@@ -130,15 +133,13 @@ def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float
             k = int(np.argmax(np.abs(values + gamma * slopes)))
             return complex(values[k]), complex(slopes[k])
 
-        return _exchanged(highest, _first_gamma(bound, alpha, beta) / 4)
+        return _exchanged(highest, _first_gamma(bound, alpha, beta) / 4)[1]
 
     def rough(logarithms: np.ndarray) -> float:
         alpha, beta = np.exp(logarithms)
         return on_grid(float(alpha), float(beta))
 
-    def located(logarithms: np.ndarray) -> float:
-        alpha, beta = (float(constant) for constant in np.exp(logarithms))
-
+    def located(alpha: float, beta: float) -> tuple[float, float]:
         def highest(gamma: float) -> tuple[complex, complex]:
             _, at = searched_norm(W_a * second_order(alpha, beta, gamma).one_plus)
             if not np.isfinite(at):
@@ -160,14 +161,14 @@ def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float
             start,
             method="Nelder-Mead",
             bounds=limits,
-            options={"maxfev": most, "initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-9},
+            options={"maxfev": most, "initial_simplex": simplex, "xatol": 1e-7, "fatol": 1e-10},
         )
         return np.asarray(found.x)
 
     constants = np.geomspace(*ends, 16)
     starts = sorted((on_grid(alpha, beta), alpha, beta) for alpha in constants for beta in constants if beta <= alpha)
     found = [polish(rough, np.log(start[1:]), -0.1, 200) for start in starts[:2]]
-    best = polish(located, min(found, key=rough), -0.002, 40)
+    best = polish(lambda logarithms: located(*np.exp(logarithms))[1], min(found, key=rough), -0.002, 100)
     beta, alpha = sorted(float(constant) for constant in np.exp(best))
-    gamma, f = optimal_gamma(bound, alpha, beta)
-    return alpha, beta, gamma, f
+    gamma, _ = located(alpha, beta)
+    return alpha, beta, gamma, uncertainty_cost(bound, second_order(alpha, beta, gamma).one_plus)[0]
