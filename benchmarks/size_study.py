@@ -29,18 +29,18 @@ from experiments.campaign import run_campaign
 from experiments.runs.references import sinusoid
 folder, plants = Path(sys.argv[1]), int(sys.argv[2])
 
-def made_up(campaign, chunks):
+def made_up(_, chunks, scheduler):
     random = np.random.default_rng(1)
-    for first, last in chunks:
+    for number, (first, last) in enumerate(chunks):
         count = 3 * (last - first)
         runs = ["none", "thesis", "corrected"] * (last - first)
         rows = {"plant": np.repeat(range(first, last), 3), "anti_windup": runs}
         names = ["distance", "peak_error", "steady_error", "recovery_s", *(f"number_{k}" for k in range(16))]
         rows |= dict(zip(names, random.uniform(size=(20, count)), strict=True))
         rows |= dict.fromkeys(("linear_stable", "diverged", "covered"), [False] * count)
-        yield (first, last), rows | {"guaranteed_sector": [0.0] * count}
+        yield number, rows | {"guaranteed_sector": [0.0] * count}
 
-run_campaign.run_here = made_up
+run_campaign.spread = made_up
 file, reference = folder / "design.json", sinusoid(amplitude=50.0, omega=1.5)
 output = folder / "campaign.parquet"
 run_campaign.run_campaign(read_design(file), file, plants, 1, reference, 12.0, 5, None, output, False)

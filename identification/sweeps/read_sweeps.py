@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
+
+import numpy as np
 
 from identification.base.errors import printable
 from identification.base.files import require_readable
+from identification.formats.columns import Table
 from identification.formats.csv_file import read_csv
 from identification.formats.first_bytes import usual_suffix
-from identification.formats.mat_file import read_mat
 from identification.formats.reading import Reading
 from identification.formats.uff_file import read_uff
 from identification.sweeps.from_table import from_record, from_response
@@ -19,7 +22,15 @@ from identification.sweeps.kept_responses import read_responses
 from identification.sweeps.response import FrequencyResponse
 
 KEPT = ".npz"
-READERS = {**dict.fromkeys(CSV, read_csv), **dict.fromkeys(MAT, read_mat), **dict.fromkeys(UFF, read_uff)}
+
+
+def _read_mat(path: Path, reading: Reading) -> list[Table]:
+    from identification.formats.mat_file import read_mat  # h5py and scipy.io take a tenth of a second
+
+    return read_mat(path, reading)
+
+
+READERS = {**dict.fromkeys(CSV, read_csv), **dict.fromkeys(MAT, _read_mat), **dict.fromkeys(UFF, read_uff)}
 
 
 def read_sweeps(paths: Path | str | Sequence[Path | str], reading: Reading | None = None) -> list[FrequencyResponse]:
@@ -66,14 +77,15 @@ def read_sweeps(paths: Path | str | Sequence[Path | str], reading: Reading | Non
 
 def _without_copies(tests: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
     """The tests without those that are another bit for bit: no two measurements have the same noise."""
-    kept: dict[tuple[bytes, bytes], FrequencyResponse] = {}
+    kept: dict[bytes, FrequencyResponse] = {}
     for test in tests:
-        content = (test.omega.tobytes(), test.response.tobytes())
-        if (first := kept.get(content)) is None:
-            kept[content] = test
+        content = sha256(np.ascontiguousarray(test.omega).data)
+        content.update(np.ascontiguousarray(test.response).data)
+        if (first := kept.get(content.digest())) is None:
+            kept[content.digest()] = test
         else:
             remark = f"{test.name} is the same measurement and was left out"
-            kept[content] = replace(first, remarks=(*first.remarks, remark))
+            kept[content.digest()] = replace(first, remarks=(*first.remarks, remark))
     return list(kept.values())
 
 

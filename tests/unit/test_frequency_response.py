@@ -14,8 +14,8 @@ from sweep_columns import COLUMNS, FREQUENCY_HZ, RESPONSE
 
 from data.thesis import THESIS
 from identification.base.errors import InputError
-from identification.sweeps.kept_responses import write_responses
 from identification.sweeps.input_files import input_files
+from identification.sweeps.kept_responses import write_responses
 from identification.sweeps.read_sweeps import read_sweeps
 from identification.sweeps.response import FrequencyResponse
 
