@@ -33,9 +33,9 @@ $(foreach name,$(filter-out BUILD OUT,$(GIVEN)),$(eval $(call hand,$(name))))
 figures report: export ANTIWINDUP_OUTPUT := $(value BUILD)
 refit: export ANTIWINDUP_OUTPUT := $(value OUT)
 
-.PHONY: help figures report refit claims test bench study referee fuzz faults audit lint clean
+.PHONY: help figures report refit claims test bench bench-build study referee fuzz faults audit lint clean
 help: ## say what there is
-	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 	@echo
 	@echo 'make figures MODEL=implied    redraw for the thesis'"'"'s own set (or table, or a model.json); ONLY=fig_2_01'
 	@echo 'make refit SWEEPS="a.csv b.mat folder" OUT=mine    from your own sweeps to mine/summary.pdf and mine/figures'
@@ -59,6 +59,9 @@ test: lint ## check style, types and everything else
 bench: $(BENCH_READY) ## measure speed as ratios against peers, and the cost of a run (needs a C compiler)
 	$(PY) -m pytest -q -s benchmarks --benchmark-only --benchmark-columns=median,iqr,rounds
 	$(PY) benchmarks/closed_loop_cost.py --output build/bench
+bench-build: $(READY) ## measure, TIMES times each, what a user waits for: figures, report, refit, first page, --help, a first figure
+	@mkdir -p build/bench
+	$(PY) -m benchmarks.build_study --times="$$ANTIWINDUP_TIMES" --output=build/bench
 study: $(READY) ## fit hundreds of synthetic sets: success, distance from the Cramer-Rao bound, coverage, time
 	$(PY) benchmarks/identification_study.py --sets="$$ANTIWINDUP_SETS"
 referee: $(READY) ## compare CASES (200) random cases of SEED with independent numerics, all that is said of them
