@@ -12,6 +12,7 @@ import tempfile
 import time
 import zlib
 from collections.abc import Callable, Iterator
+from itertools import chain
 from pathlib import Path
 from struct import pack
 from typing import NamedTuple
@@ -27,6 +28,7 @@ HORIZON_S, RATE_HZ = 1e4, 2000.0
 IMPORTS = "from experiments.campaign import checkpoint, distributions, run_plants; import pyarrow.parquet"
 CAMPAIGN = """
 import sys, numpy as np
+from itertools import chain
 from pathlib import Path
 from design.design_file import read_design
 from experiments.campaign import run_campaign
@@ -152,7 +154,7 @@ def main() -> None:
     print(f"{'input':32s}{'size':>12s}{'status':>8s}{'time s':>9s}{'at most':>9s}{'peak MB':>9s}{'at most':>9s}")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        held = [case.holds() for case in (*fits(folder, sizes), *runs(folder, sizes))]
+        held = [case.holds() for case in chain(fits(folder, sizes), runs(folder, sizes))]
     sys.exit(int(not all(held)))
 
 
