@@ -107,7 +107,7 @@ def limits(
     with tqdm(desc="limits", unit="", disable=None, leave=False) as bar:
         asked = sinusoids(content, **reference)
         names = ("none", "corrected")
-        write_into(output, limits_tables(content, asked, limits, bar.update, names, rate_limit, scheduler))
+        write_into(output, limits_tables(content, asked, limits, bar.update, names, rate_limit, scheduler=scheduler))
 
 
 @main.command("compare", cls=PairCommand)
