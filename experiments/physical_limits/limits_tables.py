@@ -77,15 +77,15 @@ def limits_tables(
     harmonic(plant, reference)
     pairs = [finite_limits(plant, limit) for limit in limits]
     rows = [(pair, False) for pair in sorted(set(pairs), key=lambda pair: (pair[1] - pair[0], pair))]
-    items, work = [(pairs[0], True), *rows], partial(_under, design, reference, names, rate_limit)
+    items, work = [(pairs[0], True), *rows], partial(limit_table, design, reference, names, rate_limit)
     if scheduler is None:
         summary, *found = [work(item, tick=tick) for item in items]
     else:
-        summary, *found = gathered(work, items, tick, scheduler)
+        summary, *found = gathered(work, items, scheduler, tick)
     return {f"limits_{name}": pd.concat(found, ignore_index=True), f"limits_{name}_summary": summary}
 
 
-def _under(
+def limit_table(
     design: Design,
     reference: Reference,
     names: Sequence[str],
@@ -93,7 +93,15 @@ def _under(
     item: tuple[tuple[float, float], bool],
     tick: Tick = lambda: None,
 ) -> pd.DataFrame:
-    """The row of ``limits_KIND`` for a pair of limits, or with it True all of ``limits_KIND_summary``."""
+    """What :func:`limits_tables` holds of one pair of limits.
+
+    Parameters
+    ----------
+    design, reference, names, rate_limit, tick
+        As there.
+    item
+        (lower, upper), and whether the table is ``limits_KIND_summary``, and not the pair's row of ``limits_KIND``.
+    """
     pair, summed_up = item
     plant, facts = design.loop_plant, {"lower_limit": pair[0], "limit": pair[1], "rate_limit": of_table(rate_limit)}
     time_s = np.linspace(0.0, RUN_PERIODS * reference.period_s, RUN_PERIODS * SAMPLES_PER_PERIOD + 1)

@@ -72,8 +72,8 @@ def spread(work: Callable[[Item], Result], items: Sequence[Item], scheduler: str
 def gathered(
     work: Callable[[Item], Result],
     items: Sequence[Item],
-    tick: Callable[[], object] = lambda: None,
     scheduler: str | None = None,
+    tick: Callable[[], object] = lambda: None,
 ) -> list[Result]:
     """The results of :func:`spread` in the order of the items; ``tick`` is called after each."""
     found: dict[int, Result] = {}
