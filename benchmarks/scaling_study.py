@@ -193,13 +193,8 @@ def study(label: str, work: Work, clusters: dict[int, Cluster]) -> None:
     # beside pieces that take long scheduler and command idle, which costs as well: these take no time
     empty = least([measured(Work(bytes, list), [b"x" * max(task, result)] * EMPTY, at) for _ in range(ROUNDS)])
     piece_s, here_s = one.worker_s * work.larger, empty.handed_s + one.kept_s
-    print(
-        f"a piece of a large job: {piece_s:.2f} s of a worker, {1e3 * empty.scheduler_s:.1f} ms of the scheduler, ",
-        end="",
-    )
-    print(
-        f"{1e3 * here_s:.1f} ms of the command, {1e3 * one.kept_s:.1f} of them its part; {task} B there, {result} B back"
-    )
+    of_each = f"{piece_s:.2f} s of a worker, {1e3 * empty.scheduler_s:.1f} ms of the scheduler"
+    print(f"a piece of a large job: {of_each}, {1e3 * here_s:.1f} ms of the command; {task} B there, {result} B back")
     print(f"{'workers':>8s}{'pieces/s':>10s}{'efficiency':>12s}{'MB/s':>8s}  limited by")
     for workers in MODELLED:
         rates = {"workers": workers / piece_s, "scheduler": 1 / empty.scheduler_s, "command": 1 / here_s}
