@@ -56,9 +56,11 @@ claims: $(READY) ## recompute what the thesis claims and say what agrees: build/
 	@$(PY) -m experiments thesis equations --page docs/equations.md
 test: lint ## check style, types and everything else
 	$(PY) -m pytest -q -n 2 --dist loadfile
-bench: $(BENCH_READY) ## measure speed as ratios against peers, and the cost of a run (needs a C compiler)
+bench: $(BENCH_READY) ## measure speed as ratios against peers, the cost of a run, the memory of large inputs, and how large work scales (needs a C compiler)
 	$(PY) -m pytest -q -s benchmarks --benchmark-only --benchmark-columns=median,iqr,rounds
 	$(PY) benchmarks/closed_loop_cost.py --output build/bench
+	$(PY) benchmarks/size_study.py
+	$(PY) benchmarks/scaling_study.py
 study: $(READY) ## fit hundreds of synthetic sets: success, distance from the Cramer-Rao bound, coverage, time
 	$(PY) benchmarks/identification_study.py --sets="$$ANTIWINDUP_SETS"
 referee: $(READY) ## compare CASES (200) random cases of SEED with independent numerics, all that is said of them
@@ -66,10 +68,9 @@ referee: $(READY) ## compare CASES (200) random cases of SEED with independent n
 fuzz: $(READY) ## give the commands CASES (10000) damaged files, odd numbers and odd names of each kind, of SEED; faults: build/fuzz
 	$(PY) -m benchmarks.fuzz --cheap --cases="$${ANTIWINDUP_CASES:-10000}" --seed="$$ANTIWINDUP_SEED" --keep=build/fuzz
 	$(PY) -m benchmarks.fuzz --cases=100 --seed="$$ANTIWINDUP_SEED" --keep=build/fuzz
-faults: $(READY) ## interrupt, kill, starve and double the commands TIMES times each with SEED; measure large inputs
+faults: $(READY) ## interrupt, kill, starve and double the commands TIMES times each with SEED
 	$(PY) -m benchmarks.interrupts --times="$$ANTIWINDUP_TIMES" --seed="$$ANTIWINDUP_SEED"
 	$(PY) -m benchmarks.faults --times="$$ANTIWINDUP_TIMES" --seed="$$ANTIWINDUP_SEED"
-	$(PY) benchmarks/size_study.py
 audit: $(AUDIT_READY) ## look the locked packages up in the database of known vulnerabilities (needs the network)
 	.venv/bin/pip-audit --strict --disable-pip --requirement requirements.lock --requirement requirements-bench.lock
 lint: $(READY) ## check style and types
