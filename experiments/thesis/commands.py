@@ -135,15 +135,20 @@ def limits(design: Path, scheduler: str | None, output: Path) -> None:
 
 
 @thesis.command("conditions")
+@SCHEDULER
 @OUTPUT_FOLDER
-def conditions(output: Path) -> None:
+def conditions(scheduler: str | None, output: Path) -> None:
     """What the thesis does not print, searched by what it does: conditions.csv, conditions_summary.csv."""
+    from functools import partial
+
     from tqdm import tqdm
 
+    from experiments.runs.batch import on_cluster, threaded
     from experiments.thesis.unprinted.search import conditions_tables
 
     with tqdm(desc="conditions", unit="", disable=None, leave=False) as bar:
-        write_into(output, conditions_tables(tick=bar.update))
+        there = partial(on_cluster, scheduler=scheduler) if scheduler else threaded
+        write_into(output, conditions_tables(each=partial(there, tick=bar.update)))
 
 
 @thesis.command("sampled-rates")
