@@ -31,14 +31,17 @@ from design.chapters_3_4.design_extended import design_extended
 from experiments.campaign.checkpoint import CHUNK, MOST_CHUNK, CampaignFile
 from experiments.campaign.run_plants import Campaign, run_chunk
 from experiments.physical_limits.limits_tables import limit_table
+from experiments.runs.batch import _each
 from experiments.runs.code_hash import environment
 from experiments.runs.compare_anti_windups import NAMES
 from experiments.runs.workers import _answer, spread
 from experiments.thesis.printed_choices import thesis_reference
+from experiments.thesis.unprinted.chapter_4_conditions import Conditions, Point
 
 ROOT = Path(__file__).resolve().parents[1]
 LIMIT, PERIODS = 12.0, 5
 PIECES, ROUNDS = 3, 3  # a worker, and how often
+POINTS = 64  # of a piece of the search
 EMPTY = 200  # pieces that do nothing
 PATIENCE_S = 120.0
 MODELLED = (1, 10, 100, 1000)  # workers
@@ -161,13 +164,20 @@ def limits_work() -> Work:
     )
 
 
+def search_work() -> Work:
+    """Points of the search for what the thesis does not print."""
+    condition = Conditions("implied", "exact")
+    points = [Point((1.01 + k / 100) * condition.required, 0.0) for k in range(POINTS)]
+    return Work(partial(_each, partial(Conditions.both, condition)), lambda count: [points] * count)
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--workers", type=int, nargs="+", default=[1, 2], help="of each cluster, the first 1")
     counts = parser.parse_args().workers
     with tempfile.TemporaryDirectory() as name, ExitStack() as opened:
-        works = {"campaign": campaign_work(Path(name)), "limits": limits_work()}
+        works = {"campaign": campaign_work(Path(name)), "limits": limits_work(), "search": search_work()}
         clusters = {count: opened.enter_context(cluster(count)) for count in counts}
         for label, work in works.items():
             study(label, work, clusters)
