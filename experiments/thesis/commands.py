@@ -116,8 +116,9 @@ def chapter_4(design: Path, limit: float | None, output: Path) -> None:
 
 @thesis.command("limits")
 @DESIGN
+@SCHEDULER
 @OUTPUT_FOLDER
-def limits(design: Path, output: Path) -> None:
+def limits(design: Path, scheduler: str | None, output: Path) -> None:
     """What no controller of DESIGN's plant can better: limits_KIND.csv, limits_KIND_summary.csv."""
     from tqdm import tqdm
 
@@ -129,7 +130,8 @@ def limits(design: Path, output: Path) -> None:
     content = read_design(design)
     reference = thesis_reference(content.kind, content.reference_omegas)
     with tqdm(desc="limits", unit="", disable=None, leave=False) as bar:
-        write_into(output, limits_tables(content, reference, several_limits(content), bar.update))
+        asked = several_limits(content)
+        write_into(output, limits_tables(content, reference, asked, bar.update, scheduler=scheduler))
 
 
 @thesis.command("conditions")
