@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
 from functools import cache
 from math import tau
@@ -32,6 +33,15 @@ LONGEST = (
     "unit/test_uncertainty.py",
     "unit/test_pick.py",
 )
+
+
+gc.disable()  # while modules are imported and tests collected: all that is made then stays
+
+
+def pytest_collection_finish() -> None:
+    """What is there now is looked at by no collection of the garbage that tests leave."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
