@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from fractions import Fraction
 
 import numpy as np
 
 from design.blocks.block import Block
-from design.blocks.positivity import combined, not_positive_at, squared_magnitude
+from design.blocks.positivity import exact, not_positive_at, squared_magnitude
 from identification.base.arrays import Real
 from identification.base.errors import InputError
 
@@ -157,8 +156,8 @@ def block_norm(block: Block) -> tuple[float, float]:
     magnitude = _magnitude(block)
     numerator, denominator = squared_magnitude(block.zeros), squared_magnitude(block.poles)
     while True:
-        above = (Fraction(value) * (1 + Fraction(CERTIFIED))) ** 2
-        at = not_positive_at(combined(above, denominator, -(Fraction(block.gain) ** 2), numerator))
+        above = (exact(value) * (1 + exact(CERTIFIED))) ** 2
+        at = not_positive_at(above * denominator - exact(block.gain) ** 2 * numerator)
         if at is None:
             return value, omega
         near = math.sqrt(at) * np.linspace(1 - 1e-3, 1 + 1e-3, POINTS)

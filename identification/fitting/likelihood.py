@@ -19,6 +19,7 @@ RATIOS = 20.0  # of floor and relative error at the median response: logarithm o
 GAIN = 20.0  # the gain is sought up to this factor's logarithm from the one that fits the guess
 CLOSEST = 1e-8  # no relative error below this is believed: files do not carry more digits
 NEWTON = 12  # steps for the scale of soft-L1 errors
+CONVERGED = 1e-8  # relative change of that scale, whose square is the next one's
 HELD = 500_000  # numbers of the grid's lines at a time
 
 
@@ -106,6 +107,8 @@ def _soft_factor(scaled: Real, factor: Real, least: float) -> Real:
         slope = np.mean(z * (1 + z / 2) / (1 + z) ** 1.5, axis=1)
         step = np.clip(excess / np.maximum(slope, np.finfo(float).tiny), -1.0, 1.0)
         factor = np.maximum(factor * np.exp(step), least)
+        if np.max(np.abs(step)) < CONVERGED:
+            break
     return factor
 
 

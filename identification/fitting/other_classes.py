@@ -102,7 +102,7 @@ def _with_unstable_poles(test: FrequencyResponse, structure: Structure) -> tuple
     response = scaled.lines.response
     sigma = np.asarray(np.sqrt(np.abs(response) ** 2 * scaled.lines.excitation))
     every = [each for each in (*SIMPLER, structure, RICHEST) if NUMBERS * each.free < 2 * scaled.omega.size]
-    tried = [(*unstable_poles(scaled.omega, response, sigma, each), each) for each in every]
+    tried = [(*unstable_poles(scaled.omega, response, sigma, scaled.likely_delays, each), each) for each in every]
     nearest = min(found for found, _, _ in tried)
     found, poles, which = next(each for each in tried if each[0] <= ALIKE * nearest)
     return found, poles[(np.abs(poles) > scaled.omega[0]) & (np.abs(poles) < scaled.omega[-1])] * scaled.centre, which

@@ -100,15 +100,16 @@ def run(tree: Path, code: str, **environment: str) -> list[str]:
 
 DIGESTS = """
 import sys
-import experiments.campaign.run_plants as campaign
+import experiments.engine.integrator
+from experiments.runs import code_hash
 from identification.base.compiled import code_cache
 for file in (None, None, "experiments/engine/crossings.py", "design/stability/jet.py"):
     if file:
         with open(file, "a", encoding="utf-8") as module:
             module.write("# edited\\n")
     code_cache.cache_clear()
-    campaign.code_sha256.cache_clear()
-    print(code_cache("experiments"), campaign.code_sha256())
+    code_hash.code_sha256.cache_clear()
+    print(code_cache("experiments"), code_hash.code_sha256())
 """
 
 

@@ -18,7 +18,7 @@ from scipy.signal import chirp, cont2discrete, dlsim
 
 from design.design_file import Design
 from experiments.campaign.draw_plants import PlantsWithin
-from experiments.campaign.run_plants import Campaign, code_sha256, run_chunk
+from experiments.campaign.run_plants import Campaign, run_chunk
 from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies import f_gamma, hidden_modes, interpolation, trade_off
 from experiments.thesis.studies.additive_error import additive_error_tables
@@ -129,8 +129,8 @@ def test_a_campaign(small_designs: dict[str, Design], kind: str, units: Units) -
         design = each.design(small_designs[kind])
         reference = thesis_reference(kind, design.reference_omegas)
         limit = LIMIT * abs(each.input)
-        campaign = Campaign(design, str(each), 1, reference, (-limit, limit), 5, code_sha256())
-        return pd.DataFrame(run_chunk(campaign, 0, 2))
+        campaign = Campaign(design, str(each), 1, reference, (-limit, limit), 5)
+        return pd.DataFrame(run_chunk(campaign, (0, 2)))
 
     found, expected = rows(units), rows(Units())
     assert list(found.pop("plant")) == list(expected.pop("plant")) == [0, 0, 0, 1, 1, 1]

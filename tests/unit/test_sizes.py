@@ -19,7 +19,13 @@ from identification.fitting import grouped_lines
 from identification.fitting.dead_time import group_delay
 from identification.fitting.fit_plant import fit_plant
 from identification.fitting.grouped_lines import grouped
-from identification.fitting.least_squares import BLOCK, _normal_at, information, log_jacobian, response_of
+from identification.fitting.least_squares import (
+    BLOCK,
+    information,
+    log_jacobian,
+    normal_equations,
+    response_of,
+)
 from identification.fitting.likelihood import noise_levels
 from identification.formats import mat_level_5, sizes
 from identification.formats.csv_file import read_csv
@@ -85,7 +91,7 @@ def test_blocks_of_lines_are_added() -> None:
     response = value * (1 + 0.1 * np.sin(omega))
     rows = value[:, None] * log_jacobian(structure, theta, omega) / sigma[:, None]
     residual = (value - response) / sigma
-    cost, slope, curvature = _normal_at(theta, structure.counts, omega, response, sigma, False)
+    cost, slope, curvature = normal_equations(structure, theta, omega, response, sigma, soft=False)
     assert cost == pytest.approx(np.sum(np.abs(residual) ** 2))
     np.testing.assert_allclose(slope, (rows.conj().T @ residual).real, rtol=1e-9, atol=1e-9 * cost)
     for found in (curvature, information(structure, theta, omega, sigma)):

@@ -18,7 +18,7 @@ from experiments.runs.design_loop import design_loop
 from experiments.thesis import printed_choices
 from experiments.thesis.claims.printed_number import PrintedNumber
 from experiments.thesis.unprinted import chapter_2_weights, joint_search, search
-from experiments.thesis.unprinted.chapter_2_weights import Weights, delay_free_rows, delay_free_scan, errors, loop_of
+from experiments.thesis.unprinted.chapter_2_weights import Weights, delay_free_rows, delay_free_scan, loop_of
 from experiments.thesis.unprinted.chapter_4_conditions import Conditions, Point, starting_at, with_pade_at_rest
 from experiments.thesis.unprinted.joint_search import judged, together
 from experiments.thesis.unprinted.printed_outcomes import (
@@ -26,11 +26,11 @@ from experiments.thesis.unprinted.printed_outcomes import (
     READINGS,
     printed_outcomes,
     settled_s,
-    where_met,
     with_anti_windup,
     without_anti_windup,
 )
 from experiments.thesis.unprinted.search import Grid, alone, every_condition, grid_of, scanned
+from experiments.thesis.unprinted.where_met import where_met
 
 COARSE = Grid(np.array([0.9, 1.1, 1.2, 1.3, 1.6, 1.9, 2.4]), np.array([1.001, 1.05, 1.1]), np.linspace(0.8, 1.2, 3))
 
@@ -47,7 +47,7 @@ def implied_exact(by_delay: dict[str, Conditions]) -> Conditions:
 
 @pytest.fixture(scope="module")
 def scan(implied_exact: Conditions) -> pd.DataFrame:
-    return scanned([implied_exact], COARSE)
+    return scanned([implied_exact], COARSE.scan)
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def test_an_initial_output_is_an_offset_of_the_reference(
 def test_the_plant_alone_would_keep_its_output(implied_exact: Conditions) -> None:
     """With a limit of next to nothing the error is r - y(0) for ever: past inputs are zero, the modes at rest."""
     time_s = np.linspace(0.0, 3.0, 31)
-    loop = starting_at(implied_exact.loop("none", 0.0), implied_exact.design, 20.0)
+    loop = starting_at(implied_exact.loop("none", 0.0).loop, implied_exact.design, 20.0)
     error = simulate(loop, (-1e-9, 1e-9), time_s).outputs["error"]
     np.testing.assert_allclose(error, implied_exact.reference(time_s) - 20.0, atol=1e-6)
 
@@ -299,7 +299,7 @@ def test_a_misprinted_limit_would_give_the_error_of_chapter_2(needs: pd.DataFram
         0
     ]
     assert row["limit"] == pytest.approx(10.98, abs=0.005)
-    again = errors(loop_of(printed_choices.chapter_2("implied")), row["limit"], 0.0)["peak_percent"]
+    again = loop_of(printed_choices.chapter_2("implied")).errors(row["limit"], 0.0)["peak_percent"]
     assert abs(again - row["printed"]) <= row["tolerance"]
 
 
@@ -345,7 +345,7 @@ def test_the_command_refuses_a_missing_folder(tmp_path: Path) -> None:
 def test_two_searches_agree(implied_exact: Conditions) -> None:
     """Threads change no digit."""
     small = Grid(np.array([1.1, 1.3]), np.array([1.05]), np.array([1.0]))
-    one, other = (scanned([implied_exact], small) for _ in range(2))
+    one, other = (scanned([implied_exact], small.scan) for _ in range(2))
     pd.testing.assert_frame_equal(one, other, check_exact=True)
 
 
