@@ -95,6 +95,7 @@ INSTALLED = ("antiwindup", "data/thesis", *ROOMS)
 BESIDE = {"antiwindup", "setup.py", "benchmarks", "data", "tests"}
 BY_NAME = {
     "antiwindup/__main__.py",
+    "antiwindup/preloaded.py",
     "experiments/thesis/claims/equations_page.py",
     "experiments/thesis/claims/ledger.py",
     "identification/base/faces.py",
