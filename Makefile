@@ -33,7 +33,7 @@ $(foreach name,$(filter-out BUILD OUT,$(GIVEN)),$(eval $(call hand,$(name))))
 figures report: export ANTIWINDUP_OUTPUT := $(value BUILD)
 refit: export ANTIWINDUP_OUTPUT := $(value OUT)
 
-.PHONY: help figures report refit claims test bench bench-build study referee fuzz faults audit lint clean
+.PHONY: help figures report refit claims test suite bench bench-build study referee fuzz faults audit lint clean
 help: ## say what there is
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 	@echo
@@ -54,7 +54,9 @@ claims: $(READY) ## recompute what the thesis claims and say what agrees: build/
 	@mkdir -p build/claims
 	@$(PY) -m experiments thesis claims --output build/claims --page CLAIMS.md
 	@$(PY) -m experiments thesis equations --page docs/equations.md
-test: lint ## check style, types and everything else
+test: $(READY) ## check style, types and everything else
+	@$(MAKE) --no-print-directory --jobs=2 lint suite
+suite: $(READY) ## run the tests alone
 	$(PY) -m pytest -q -n 2 --dist loadfile
 bench: $(BENCH_READY) ## measure speed against peers (needs a C compiler), the memory of large inputs, and how large work scales
 	$(PY) -m pytest -q -s benchmarks --benchmark-only --benchmark-columns=median,iqr,rounds
