@@ -79,9 +79,12 @@ def compile_loop(
     of_m, of_now, of_u = (loop.D[:, now] @ direct[now]).T
     A, B, by_u = A + np.outer(of_u, C), loop.B + of_m + of_now, np.outer(of_u, loop.E)
     D, E, Z, direct, delays = _merged(replace(loop, D=loop.D + by_u), direct)
-    brief = delays * max(_fastest(A, B, C), _fastest(A + D @ Z, B, C + E @ Z)) <= most_brief
-    brief &= ~direct.any(axis=1)
-    A, C = A + D[:, brief] @ Z[brief], C + E[brief] @ Z[brief]
+    fastest = _fastest(A, B, C)
+    brief = (delays * fastest <= most_brief) & ~direct.any(axis=1)
+    if brief.any():
+        brief &= delays * _fastest(A + D @ Z, B, C + E @ Z) <= most_brief
+        A, C = A + D[:, brief] @ Z[brief], C + E[brief] @ Z[brief]
+        fastest = _fastest(A, B, C)
     n, k = len(loop.x0), len(delays)
     watched, watched_direct, groups, lags, reading = _watched(loop)
     # what u - sat(u) drives is driven by zeros in the loop without saturation, and not by rounding
@@ -107,7 +110,6 @@ def compile_loop(
             mode(moved, knows, D, units[n - 1], units[n]),
         ]
 
-    fastest = _fastest(A, B, C)
     step = min(FURTHEST / fastest if fastest > 0 else np.inf, most_step)
     if not brief.all():
         shortest = float(delays[~brief].min())

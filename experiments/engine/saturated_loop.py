@@ -88,7 +88,7 @@ class SaturatedLoop:
             raise InputError(f"the loop's dead times are {self.delays.tolist()} s; expected finite ones, not negative")
 
 
-def with_actuator(loop: SaturatedLoop, start: float) -> SaturatedLoop:
+def with_actuator(loop: SaturatedLoop) -> SaturatedLoop:
     """Append the states of an actuator with a rate limit, its rate and its output, which move nothing by themselves."""
     return replace(
         loop,
@@ -97,7 +97,7 @@ def with_actuator(loop: SaturatedLoop, start: float) -> SaturatedLoop:
         C=np.pad(loop.C, (0, 2)),
         D=np.pad(loop.D, ((0, 2), (0, 0))),
         Z=np.pad(loop.Z, ((0, 0), (0, 2))),
-        x0=np.append(loop.x0, [0.0, start]),
+        x0=np.append(loop.x0, [0.0, 0.0]),
         outputs={name: (np.pad(x, (0, 2)), w) for name, (x, w) in loop.outputs.items()},
         B_limits=None if loop.B_limits is None else np.pad(loop.B_limits, (0, 2)),
     )

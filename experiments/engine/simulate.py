@@ -12,7 +12,8 @@ import numpy as np
 
 from experiments.engine import integrator
 from experiments.engine.compiled_loop import BRIEF, FURTHEST, CompiledLoop, compile_loop
-from experiments.engine.saturated_loop import SaturatedLoop, with_actuator
+from experiments.engine.ready_loop import ReadyLoop, ready_loop
+from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.watched import Stopped, Tick, watched
 from identification.base.errors import InputError, shown
 
@@ -106,7 +107,7 @@ class DivergenceError(InputError):
 
 
 def simulate(
-    loop: SaturatedLoop,
+    loop: SaturatedLoop | ReadyLoop,
     limits: tuple[float, float],
     time_s: np.ndarray,
     tick: Tick | None = None,
@@ -117,7 +118,8 @@ def simulate(
     Parameters
     ----------
     loop
-        See :class:`SaturatedLoop`.
+        See :class:`SaturatedLoop`; or what :func:`experiments.engine.ready_loop.ready_loop` makes of it, with its rate,
+        which spares runs with other limits or from other states the preparation.
     limits
         (sigma_1, sigma_2) of the saturation, sigma_1 < sigma_2, either may be infinite.
     time_s
@@ -146,7 +148,7 @@ def simulate(
 
 
 def simulate_watched(
-    loop: SaturatedLoop,
+    loop: SaturatedLoop | ReadyLoop,
     limits: tuple[float, float],
     time_s: np.ndarray,
     watch: np.ndarray,
@@ -168,17 +170,17 @@ def simulate_watched(
     if not (increasing and np.all(np.isfinite(time_s))):
         raise InputError("the sample times are not increasing finite numbers from zero on that end after zero")
     horizon = float(time_s[-1])
+    ready = loop if isinstance(loop, ReadyLoop) else ready_loop(loop, rate, idle_step=horizon)
+    own, compiled, rate = ready.loop, ready.compiled, ready.rate
     slews = math.isfinite(rate)
-    if slews:
-        loop = with_actuator(loop, float(np.clip(0.0, low, high)))
-    compiled = compile_loop(loop, idle_step=horizon, slews=slews)
+    x0 = np.append(own.x0[:-1], np.clip(0.0, low, high)) if slews else own.x0
     most_events, room, brief = 4096, _room(compiled), BRIEF
     while True:
         _require_affordable(compiled, room, horizon)
         values, events, modes, places, status, end, _, tail = integrator.integrate(
-            compiled,
-            loop.resets.times_s,
-            loop.resets.values,
+            compiled._replace(x0=x0),
+            own.resets.times_s,
+            own.resets.values,
             float(low),
             float(high),
             float(rate),
@@ -193,7 +195,7 @@ def simulate_watched(
             most_events *= 8
         elif status == integrator.UNSETTLED or (status == integrator.COMPLETE and tail > TAIL):
             brief = 0.0 if status == integrator.UNSETTLED else brief
-            compiled = compile_loop(loop, compiled.step / 2, brief, slews=slews)
+            compiled = compile_loop(own, compiled.step / 2, brief, slews=slews)
             room = max(room, _room(compiled))
         else:
             break
@@ -212,7 +214,7 @@ def simulate_watched(
         time_s=time_s,
         control=values[0],
         saturated_control=np.clip(m, low, high),
-        outputs=dict(zip(loop.outputs, outputs, strict=True)),
+        outputs=dict(zip(own.outputs, outputs, strict=True)),
         events_s=events,
         modes=modes,
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,10 +14,12 @@ from scipy.optimize import brentq
 
 from design.design_file import Design
 from experiments.drive.sampled_loop import Drive, simulate_sampled
+from experiments.engine.ready_loop import ready_loop
 from experiments.engine.saturated_loop import Resets, SaturatedLoop
 from experiments.engine.simulate import simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import sinusoid
+from experiments.thesis.printed_choices import thesis_reference
 from identification.base.errors import InputError
 
 FREE = (-np.inf, np.inf)
@@ -79,7 +83,7 @@ def random_loop(rng: np.random.Generator) -> SaturatedLoop:
     )
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_march_without_modes_comes_as_near_as_its_steps(seed: int) -> None:
     rng = np.random.default_rng([seed, 17])
     loop, rate = random_loop(rng), float(np.exp(rng.uniform(0, 2.5)))
@@ -186,3 +190,14 @@ def test_a_rate_that_nothing_needs_changes_nothing(extended_design: Design) -> N
 def test_a_rate_that_is_none(rate: float) -> None:
     with pytest.raises(InputError, match="the rate limit is"):
         simulate(integrator(1.0, 0.1), FREE, np.array([0.0, 1.0]), rate=rate)
+
+
+@pytest.mark.parametrize("rate", [math.inf, 300.0])
+def test_a_loop_made_ready_once_runs_with_any_limits_from_any_state(extended_design: Design, rate: float) -> None:
+    loop = design_loop(extended_design, thesis_reference("extended", [1.5]), "thesis")
+    ready, time_s = ready_loop(loop, rate), np.linspace(0.0, 0.3, 31)
+    for limits, moved in (((-12.0, 12.0), 0.0), ((3.0, 5.0), 0.1)):
+        again = simulate(ready.starting_from(loop.x0 + moved), limits, time_s)
+        anew = simulate(replace(loop, x0=loop.x0 + moved), limits, time_s, rate=rate)
+        np.testing.assert_array_equal(again.control, anew.control)
+        np.testing.assert_array_equal(again.saturated_control, anew.saturated_control)
