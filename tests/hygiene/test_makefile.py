@@ -163,6 +163,19 @@ def test_a_name_with_blanks_that_is_there_needs_no_quotes(tmp_path: Path, monkey
 
 def test_every_target_is_in_the_help() -> None:
     text = run(ROOT, "help").stdout
-    targets = ["help", "figures", "report", "refit", "claims", "test", "bench", "study", "referee", "fuzz", "faults"]
+    targets = [
+        "help",
+        "figures",
+        "report",
+        "refit",
+        "claims",
+        "test",
+        "suite",
+        "bench",
+        "study",
+        "referee",
+        "fuzz",
+        "faults",
+    ]
     targets += ["audit", "lint", "clean"]
     assert all(f"\n{name} " in f"\n{text}" for name in targets)

@@ -71,7 +71,7 @@ class Stored:
     """
 
     def __init__(self, columns: Columns, name: str = "") -> None:
-        self.columns = dict(columns)
+        self.columns, self.name = dict(columns), name
         for column, want in self.columns.items():
             _require_finite(column, want, "the snapshot")
         real = {column: want for column, want in self.columns.items() if want.dtype.kind == "f"}

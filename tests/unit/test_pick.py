@@ -89,9 +89,12 @@ def in_old_units(K: Block, case: Case, time: float, gain: float) -> Block:
     return Block(K.gain * time**K.relative_degree * time ** (degree - 1) * gain, zeros, poles)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", [0, 1, 6, 7])
 def test_what_is_proved_is_true(seed: int) -> None:
-    """The lower bounds and the achieved norms of random plants; gamma_lower against Nehari's theorem in 60 digits."""
+    """The lower bounds and the achieved norms; gamma_lower against Nehari's theorem in 60 digits.
+
+    Of plants with 1, 0, 3 and 2 pairs of modes and a W_a of order 1, 2, 3 and 4.
+    """
     _, problem = stabiliser_problem(*random_case(seed))
     K, found = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
     assert nehari_excess(problem.W1, problem.W2, found.gamma_lower, 60) > 0
