@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import pickle
 import subprocess
@@ -29,13 +30,18 @@ from data.thesis import model_named
 from design.chapters_3_4.design_extended import design_extended
 from experiments.campaign.checkpoint import CHUNK, MOST_CHUNK, CampaignFile
 from experiments.campaign.run_plants import Campaign, run_chunk
+from experiments.physical_limits.limits_tables import limit_table
+from experiments.runs.batch import _each
 from experiments.runs.code_hash import environment
+from experiments.runs.compare_anti_windups import NAMES
 from experiments.runs.workers import _answer, spread
 from experiments.thesis.printed_choices import thesis_reference
+from experiments.thesis.unprinted.chapter_4_conditions import Conditions, Point
 
 ROOT = Path(__file__).resolve().parents[1]
 LIMIT, PERIODS = 12.0, 5
 PIECES, ROUNDS = 3, 3  # a worker, and how often
+POINTS = 64  # of a piece of the search
 EMPTY = 200  # pieces that do nothing
 PATIENCE_S = 120.0
 MODELLED = (1, 10, 100, 1000)  # workers
@@ -100,33 +106,42 @@ def _wait_for(address: str, workers: int) -> None:
 
 
 class Cost(NamedTuple):
-    """Of a round: seconds on the clock, and CPU seconds a piece of the workers, the scheduler and this process, whose
-    waiting for the disk counts, too."""
+    """Of a round: seconds on the clock; CPU seconds a piece of the workers, of the scheduler, and of this process while
+    it waits and hands out; and its seconds on the clock, the disk's among them, with a result."""
 
     wall_s: float
     worker_s: float
     scheduler_s: float
-    command_s: float
+    handed_s: float
+    kept_s: float
 
 
 def measured(work: Work, items: Sequence[Any], at: Cluster) -> Cost:
     """Do the work for all items."""
-    wall, own, (scheduler, workers) = time.perf_counter(), time.process_time(), at.cpu_s()
-    waited = 0.0
+    wall, own, before, kept, keeping = time.perf_counter(), time.process_time(), at.cpu_s(), 0.0, 0.0
     for number, result in spread(work.function, items, at.address):
-        kept, computed = time.perf_counter(), time.process_time()
+        begun, computed = time.perf_counter(), time.process_time()
         work.keep(items[number], result)
-        waited += time.perf_counter() - kept - (time.process_time() - computed)
-    taken = time.perf_counter() - wall
-    scheduler_end, workers_end = at.cpu_s()
-    of_each = (workers_end - workers, scheduler_end - scheduler, time.process_time() - own + waited)
-    return Cost(taken, *(seconds / len(items) for seconds in of_each))
+        kept, keeping = kept + time.perf_counter() - begun, keeping + time.process_time() - computed
+    taken, after = time.perf_counter() - wall, at.cpu_s()
+    handed = time.process_time() - own - keeping
+    each = (after[1] - before[1], after[0] - before[0], handed, kept)
+    return Cost(taken, *(seconds / len(items) for seconds in each))
 
 
-def sent(work: Work, item: Any) -> tuple[int, int]:
-    """Bytes of a piece as it is sent, and of its result."""
+def least(costs: Sequence[Cost]) -> Cost:
+    """The least of each number."""
+    return Cost(*map(min, zip(*costs, strict=True)))
+
+
+def sent(work: Work, at: Cluster) -> tuple[int, int]:
+    """Bytes of a piece as it is sent, and of its result, which is that of this process to the last bit."""
+    (item,) = work.items(1)
     task = pickle.dumps((partial(_answer, environment(), work.function), item))
-    return len(task), len(pickle.dumps(work.function(item)))
+    ((_, result),) = spread(work.function, [item], at.address)
+    if pickle.dumps(result) != pickle.dumps(pickle.loads(pickle.dumps(work.function(item)))):
+        sys.exit("a worker's result is not that of this process")
+    return len(task), len(pickle.dumps(result))
 
 
 def campaign_work(folder: Path) -> Work:
@@ -140,13 +155,29 @@ def campaign_work(folder: Path) -> Work:
     return Work(partial(run_chunk, campaign), lambda count: chunks[:count], file.keep, MOST_CHUNK // CHUNK)
 
 
+def limits_work() -> Work:
+    """Rows of the physical limits' table, a limit each."""
+    design = design_extended(model_named("implied"), [1.5], 4.0, [(2.0, 1.0)])
+    row = partial(limit_table, design, thesis_reference("extended", (1.5,)), NAMES, math.inf)
+    return Work(
+        row, lambda count: [((-limit, limit), False) for limit in (LIMIT + k % PIECES / 8 for k in range(count))]
+    )
+
+
+def search_work() -> Work:
+    """Points of the search for what the thesis does not print."""
+    condition = Conditions("implied", "exact")
+    points = [Point((1.01 + k / 100) * condition.required, 0.0) for k in range(POINTS)]
+    return Work(partial(_each, partial(Conditions.both, condition)), lambda count: [points] * count)
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--workers", type=int, nargs="+", default=[1, 2], help="of each cluster, the first 1")
     counts = parser.parse_args().workers
     with tempfile.TemporaryDirectory() as name, ExitStack() as opened:
-        works = {"campaign": campaign_work(Path(name))}
+        works = {"campaign": campaign_work(Path(name)), "limits": limits_work(), "search": search_work()}
         clusters = {count: opened.enter_context(cluster(count)) for count in counts}
         for label, work in works.items():
             study(label, work, clusters)
@@ -160,27 +191,26 @@ def study(label: str, work: Work, clusters: dict[int, Cluster]) -> None:
     for _ in range(ROUNDS):
         for count, at in clusters.items():
             rounds[count].append(measured(work, work.items(PIECES * count), at))
-    best = {count: Cost(*map(min, zip(*costs, strict=True))) for count, costs in rounds.items()}
-    one = best[min(best)]
+    best = {count: least(costs) for count, costs in rounds.items()}
+    one, at = best[min(best)], clusters[min(best)]
     print(f"\n{label}: {PIECES} pieces a worker")
-    print(f"{'workers':>8s}{'wall s':>9s}{'efficiency':>12s}{'CPU s a piece':>15s}{'here':>8s}")
+    print(f"{'workers':>8s}{'wall s':>9s}{'efficiency':>12s}{'CPU s a piece':>15s}{'efficiency':>12s}")
     for count, cost in best.items():
-        print(f"{count:8d}{cost.wall_s:9.2f}{one.wall_s / cost.wall_s:12.0%}{cost.worker_s:15.3f}{cost.command_s:8.4f}")
-    task, result = sent(work, work.items(1)[0])
+        by_cpu = f"{cost.worker_s:15.3f}{one.worker_s / cost.worker_s:12.0%}"
+        print(f"{count:8d}{cost.wall_s:9.2f}{one.wall_s / cost.wall_s:12.0%}{by_cpu}")
+    task, result = sent(work, at)
     result *= work.larger
-    # beside pieces that take long a scheduler idles, which costs as well: these take no time
-    empty = [b"x" * max(task, result)] * EMPTY
-    scheduler_s = min(measured(Work(bytes, list), empty, clusters[min(best)]).scheduler_s for _ in range(ROUNDS))
-    piece_s = one.worker_s * work.larger
-    print(f"a piece of a large job: {piece_s:.2f} s of a worker, {1e3 * scheduler_s:.2f} ms of the scheduler,", end="")
-    print(f" {1e3 * one.command_s:.2f} ms here; {task} bytes are sent, {result} come back")
+    # beside pieces that take long scheduler and command idle, which costs as well: these take no time
+    empty = least([measured(Work(bytes, list), [b"x" * max(task, result)] * EMPTY, at) for _ in range(ROUNDS)])
+    piece_s, here_s = one.worker_s * work.larger, empty.handed_s + one.kept_s
+    of_each = f"{piece_s:.2f} s of a worker, {1e3 * empty.scheduler_s:.1f} ms of the scheduler"
+    print(f"a piece of a large job: {of_each}, {1e3 * here_s:.1f} ms of the command; {task} B there, {result} B back")
     print(f"{'workers':>8s}{'pieces/s':>10s}{'efficiency':>12s}{'MB/s':>8s}  limited by")
     for workers in MODELLED:
-        rates = {"workers": workers / piece_s, "scheduler": 1 / scheduler_s, "command": 1 / one.command_s}
+        rates = {"workers": workers / piece_s, "scheduler": 1 / empty.scheduler_s, "command": 1 / here_s}
         limit = min(rates, key=lambda name: rates[name])
         rate = rates[limit]
-        share = rate * piece_s / workers
-        print(f"{workers:8d}{rate:10.1f}{share:12.0%}{rate * (task + result) / 1e6:8.2f}  {limit}")
+        print(f"{workers:8d}{rate:10.1f}{rate * piece_s / workers:12.0%}{rate * (task + result) / 1e6:8.2f}  {limit}")
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from identification.base.axis_option import AXIS
 from identification.base.command_line import CommandGroup, together
 from identification.base.files import Content, require_writable, write_whole
 from identification.base.path_types import FIGURE_FILE, INPUT, OUTPUT_FILE
-from identification.model.additive_bound import HIGHEST_ORDER
+from identification.bound.orders import HIGHEST_ORDER
 
 
 class Counts(click.ParamType):  # type: ignore[type-arg]  # generic in the newest click only

@@ -10,6 +10,7 @@ from flint import fmpq, fmpq_poly
 
 from design.blocks.block import Block
 
+CLOSE = 2.0**-16  # relative distance from a place where p almost vanishes
 NARROW = 2.0**-50  # relative width of an interval of x that is not divided further
 
 
@@ -18,13 +19,15 @@ def exact(value: float) -> fmpq:
     return fmpq(*value.as_integer_ratio())
 
 
-def not_positive_at(p: fmpq_poly) -> float | None:
+def not_positive_at(p: fmpq_poly, near: float = 0.0) -> float | None:
     """None if p(x) > 0 for every x >= 0 and p does not fall below 0 as x grows; else an x where that was not shown.
 
     Parameters
     ----------
     p
         A polynomial in x.
+    near
+        An x around which p almost vanishes, if one is known: the proof is then shorter.
 
     Returns
     -------
@@ -45,10 +48,13 @@ def not_positive_at(p: fmpq_poly) -> float | None:
         return math.inf
     if degree == 0:
         return None
-    middle = 2.0 ** round((_bits(p[0]) - _bits(p[degree])) / degree)
-    if p(exact(middle)) <= 0:
-        return middle
-    waiting = [(0.0, middle), (middle, math.inf)]
+    known = [near * (1 - CLOSE), near * (1 + CLOSE)]
+    if not 0 < near < math.inf:
+        known = [2.0 ** round((_bits(p[0]) - _bits(p[degree])) / degree)]
+    for x in known:
+        if p(exact(x)) <= 0:
+            return x
+    waiting = list(pairwise([0.0, *known, math.inf]))
     while waiting:
         low, high = waiting.pop()
         if not _may_vanish(p, low, high):

@@ -7,7 +7,8 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import NamedTuple, TypeVar
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from tqdm import tqdm
@@ -17,14 +18,18 @@ from experiments.engine.simulate import Run, limit_pair, simulate_watched
 from experiments.engine.watched import STOP, watch
 from experiments.runs.design_loop import Controller, plant_loop, realized_controller
 from experiments.runs.references import Reference, SampledReference
+from experiments.runs.workers import gathered
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
 IN_FLIGHT = 4  # runs a worker
+PIECES = 128  # sent to a cluster
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 Tick = Callable[[], object]
+Each = Callable[[Callable[[Any], Any], Sequence[Any]], list[Any]]
+"""Of a function and items, the results in the order of the items, wherever they are computed."""
 
 
 class Case(NamedTuple):
@@ -115,7 +120,7 @@ def _streamed(
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def threaded(work: Callable[[Item], Result], items: Iterable[Item], tick: Tick) -> list[Result]:
+def threaded(work: Callable[[Item], Result], items: Iterable[Item], tick: Tick = lambda: None) -> list[Result]:
     """The results of ``work`` in the order of the items, by as many threads as there are cores; ticks for each."""
 
     def counted(item: Item) -> Result:
@@ -125,3 +130,16 @@ def threaded(work: Callable[[Item], Result], items: Iterable[Item], tick: Tick) 
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         return list(pool.map(counted, items))
+
+
+def on_cluster(
+    work: Callable[[Item], Result], items: Sequence[Item], scheduler: str, tick: Tick = lambda: None
+) -> list[Result]:
+    """The same on the Dask cluster of a scheduler, see :func:`experiments.runs.workers.spread`, in PIECES at most."""
+    size = max(1, -(-len(items) // PIECES))
+    pieces = [items[first : first + size] for first in range(0, len(items), size)]
+    return [result for part in gathered(partial(_each, work), pieces, scheduler, tick) for result in part]
+
+
+def _each(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    return [work(item) for item in items]

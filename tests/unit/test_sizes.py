@@ -230,11 +230,11 @@ def test_a_structure_is_unpacked_where_it_is_needed(tmp_path: Path, monkeypatch:
 EXTREMES = (5e-324, 1e-320, 2.3e-308, 1e-160, 1e-60, 1e-49, 1e49, 1e50, 1e160, 1e300, 1.7e308)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_extreme_numbers_end_in_a_sentence_or_a_fit(seed: int, tmp_path: Path) -> None:
     """In one place or a whole column, of a response or a record; beside another band. Warnings count as errors."""
     random = np.random.default_rng(seed)
-    frequency_hz, time_s = np.linspace(5, 80, 40), np.arange(512) * 1e-3
+    frequency_hz, time_s = np.linspace(5, 80, 24), np.arange(512) * 1e-3
     test = sweep(2 * np.pi * frequency_hz, 0.01)
     u = np.sin(2 * np.pi * (5 * time_s + 120 * time_s**2))
     kinds = (

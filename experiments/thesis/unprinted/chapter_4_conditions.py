@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import NamedTuple
+from functools import cache, cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -55,6 +55,10 @@ class Conditions:
 
     set_name: str
     delay: str
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Another process makes its loops once and not for each piece of work."""
+        return _kept, (self.set_name, self.delay)
 
     @cached_property
     def design(self) -> Design:
@@ -112,6 +116,11 @@ class Conditions:
     def both(self, point: Point, samples: int = SAMPLES_PER_PERIOD) -> dict[str, float]:
         """The outcomes of both loops."""
         return self.outcomes("none", point, samples) | self.outcomes("thesis", point, samples)
+
+
+@cache
+def _kept(set_name: str, delay: str) -> Conditions:
+    return Conditions(set_name, delay)
 
 
 def starting_at(loop: SaturatedLoop, design: Design, output: float) -> SaturatedLoop:

@@ -11,12 +11,12 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import minimize
 
-from experiments.runs.batch import Tick, threaded
+from experiments.runs.batch import Each, threaded
 from experiments.thesis.unprinted.chapter_4_conditions import Conditions, Point
 from experiments.thesis.unprinted.printed_outcomes import CONVERGED_PERCENT, READINGS, printed_outcomes
 from experiments.thesis.unprinted.where_met import Found, compared
 
-STARTS = 3  # the best points of the grid from which the search goes on
+STARTS = 3  # the best initial outputs of the grid, from which the search goes on
 EVALUATIONS = 30  # of one such search
 SEARCHES = {"together": False, "together, converging": True}
 """What is searched for -> whether the error with anti-windup must converge to zero."""
@@ -83,13 +83,15 @@ def _nearest_readings(outcomes: Mapping[str, float]) -> list[tuple[float, str]]:
 
 
 def _starts(one: Conditions, points: pd.DataFrame, converging: bool) -> list[Start]:
-    """The best points of a condition's grid, for :func:`_refined`; none where no point has all three outcomes."""
-    rows = points.to_dict("records")
-    every = [judged(Point(row["limit"], row["initial_output"]), row, converging) for row in rows]  # type: ignore[arg-type]
-    best = sorted((joint for joint in every if math.isfinite(joint.miss)), key=lambda joint: joint[:2])[:STARTS]
+    """The best initial outputs of a grid, each with its best limit; none where no point has all three outcomes."""
+    best: dict[float, Joint] = {}  # of each initial output
+    for row in points.to_dict("records"):
+        joint = judged(Point(row["limit"], row["initial_output"]), row, converging)  # type: ignore[arg-type]
+        best[joint.point.output] = min(joint, best.get(joint.point.output, joint), key=lambda joint: joint[:2])
+    starts = sorted((joint for joint in best.values() if math.isfinite(joint.miss)), key=lambda joint: joint[:2])
     shared = points[points.duplicated("limit", keep=False)]  # the grid's own, without what it was refined by
     axes = [np.unique(frame[name]) for frame, name in ((shared, "limit"), (points, "initial_output"))]
-    return [(one, start, axes, converging) for start in best]
+    return [(one, start, axes, converging) for start in starts[:STARTS]]
 
 
 def _refined(start: Start) -> Joint:
@@ -121,7 +123,7 @@ def _spacing(axis: np.ndarray, at: float) -> float:
     return float(axis[place + 1] - axis[place])
 
 
-def together(conditions: Sequence[Conditions], points: pd.DataFrame, tick: Tick = lambda: None) -> pd.DataFrame:
+def together(conditions: Sequence[Conditions], points: pd.DataFrame, each: Each = threaded) -> pd.DataFrame:
     """For each of :data:`SEARCHES` and each condition the nearest that one limit and one initial output come.
 
     Parameters
@@ -140,16 +142,16 @@ def together(conditions: Sequence[Conditions], points: pd.DataFrame, tick: Tick 
 
     Notes
     -----
-    With the exact dead time Nelder and Mead's search goes on from the best points of the grid. What it finds is a local
-    minimum; the outcomes jump. With Pade's approximation the outcomes are those at the point that the exact dead time
-    has found.
+    With the exact dead time Nelder and Mead's search goes on from the best initial outputs of the grid. What it finds
+    is a local minimum; the outcomes jump. With Pade's approximation the outcomes are those at the point that the exact
+    dead time has found.
     """
     starts: dict[tuple[str, str], list[Start]] = {}
     for (name, converging), one in product(SEARCHES.items(), conditions):
         own = points[points["set"] == one.set_name]
         if one.delay == "exact":
             starts[name, one.set_name] = _starts(one, own, converging)
-    refined = iter(threaded(_refined, [start for several in starts.values() for start in several], tick))
+    refined = iter(each(_refined, [start for several in starts.values() for start in several]))
     found = {
         key: min((next(refined) for _ in several), key=lambda joint: joint[:2])
         for key, several in starts.items()

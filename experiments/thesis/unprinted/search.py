@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from experiments.runs.batch import Tick, threaded
+from experiments.runs.batch import Each, threaded
 from experiments.thesis.unprinted.chapter_2_weights import delay_free_rows, delay_free_scan
 from experiments.thesis.unprinted.chapter_4_conditions import DELAYS, SETS, Conditions, Point
 from experiments.thesis.unprinted.joint_search import together
@@ -45,7 +45,7 @@ def usual_grid() -> Grid:
     Above that input the limits crowd towards it: the nearer, the later the loop leaves saturation.
     """
     scan = np.concatenate([np.linspace(0.5, 0.995, 16), 1 + np.geomspace(1e-4, 0.3, 30), np.geomspace(1.35, 4.0, 20)])
-    limits = np.concatenate([[0.95, 0.98, 0.99, 0.998], 1 + np.geomspace(1e-3, 3.0, 14)])
+    limits = np.concatenate([[0.95, 0.99], 1 + np.geomspace(1e-3, 3.0, 10)])
     return Grid(scan, limits, np.linspace(-1.0, 2.0, 13))
 
 
@@ -57,7 +57,7 @@ def every_condition(sets: Sequence[str] = SETS, delays: Sequence[str] = DELAYS) 
     return conditions
 
 
-def scanned(conditions: Sequence[Conditions], limits: np.ndarray, tick: Tick = lambda: None) -> pd.DataFrame:
+def scanned(conditions: Sequence[Conditions], limits: np.ndarray, each: Each = threaded) -> pd.DataFrame:
     """Every outcome over the limit, from y(0) = 0 and from y(0) = r(0).
 
     Parameters
@@ -74,15 +74,15 @@ def scanned(conditions: Sequence[Conditions], limits: np.ndarray, tick: Tick = l
         outcome of :meth:`experiments.thesis.unprinted.chapter_4_conditions.Conditions.both`, empty for never; sorted by
         these.
     """
-    return _explored(conditions, limits, np.array([0.0, 1.0]), tick)
+    return _explored(conditions, limits, np.array([0.0, 1.0]), each)
 
 
-def grid_of(conditions: Sequence[Conditions], grid: Grid, tick: Tick = lambda: None) -> pd.DataFrame:
+def grid_of(conditions: Sequence[Conditions], grid: Grid, each: Each = threaded) -> pd.DataFrame:
     """Every outcome at every limit and initial output of a grid; the columns are those of :func:`scanned`."""
-    return _explored(conditions, grid.limits, grid.outputs, tick)
+    return _explored(conditions, grid.limits, grid.outputs, each)
 
 
-def _explored(conditions: Sequence[Conditions], limits: np.ndarray, outputs: np.ndarray, tick: Tick) -> pd.DataFrame:
+def _explored(conditions: Sequence[Conditions], limits: np.ndarray, outputs: np.ndarray, each: Each) -> pd.DataFrame:
     """The outcomes at each limit and initial output, and where between two limits the lasting offset passes zero.
 
     The error converges to zero only there, on intervals that a grid would miss.
@@ -91,7 +91,7 @@ def _explored(conditions: Sequence[Conditions], limits: np.ndarray, outputs: np.
         (one, Point(float(share * one.required), float(part * one.initial_reference)))
         for one, part, share in product(conditions, outputs, limits)
     ]
-    table = _table(jobs, threaded(_both, jobs, tick))
+    table = _table(jobs, each(_both, jobs))
     spans: list[Span] = [
         (one, output, low, high)
         for one in conditions
@@ -99,8 +99,8 @@ def _explored(conditions: Sequence[Conditions], limits: np.ndarray, outputs: np.
         for low, high in pairwise(rows[["limit", "final_offset_percent"]].itertuples(index=False, name=None))
         if low[1] * high[1] < 0 and max(abs(low[1]), abs(high[1])) > CONVERGED_PERCENT
     ]
-    found = threaded(_converging, spans, tick)
-    return pd.concat([table, _table(found, threaded(_both, found, tick))], ignore_index=True).sort_values(
+    found = each(_converging, spans)
+    return pd.concat([table, _table(found, each(_both, found))], ignore_index=True).sort_values(
         ["set", "delay", "initial_output", "limit"], ignore_index=True
     )
 
@@ -142,7 +142,7 @@ def _table(jobs: Sequence[tuple[Conditions, Point]], rows: Sequence[dict[str, fl
     return pd.DataFrame([first | row for first, row in zip(head, rows, strict=True)])
 
 
-def alone(conditions: Sequence[Conditions], scan: pd.DataFrame, tick: Tick = lambda: None) -> pd.DataFrame:
+def alone(conditions: Sequence[Conditions], scan: pd.DataFrame, each: Each = threaded) -> pd.DataFrame:
     """For each outcome, reading, condition and initial output of a scan: the limits that give it, or come nearest.
 
     Returns
@@ -158,7 +158,7 @@ def alone(conditions: Sequence[Conditions], scan: pd.DataFrame, tick: Tick = lam
         for output, rows in _of(scan, one).groupby("initial_output")
         for kind, names in OUTCOMES.items()
     ]
-    return pd.DataFrame([row for rows in threaded(_found_on, jobs, tick) for row in rows])
+    return pd.DataFrame([row for rows in each(_found_on, jobs) for row in rows])
 
 
 def _found_on(line: Line) -> list[dict[str, Any]]:
@@ -181,7 +181,7 @@ def _row(one: Conditions, outcome: str, reading: str, output: float, found: Foun
     return {"outcome": outcome, "reading": reading} | under | compared(outcome, found)
 
 
-def approximated(conditions: Sequence[Conditions], exact: pd.DataFrame, tick: Tick = lambda: None) -> pd.DataFrame:
+def approximated(conditions: Sequence[Conditions], exact: pd.DataFrame, each: Each = threaded) -> pd.DataFrame:
     """Where Pade's approximation moves what the exact dead time gives.
 
     Parameters
@@ -198,7 +198,7 @@ def approximated(conditions: Sequence[Conditions], exact: pd.DataFrame, tick: Ti
         limit gives.
     """
     jobs = [(one, row) for one in conditions for row in exact[exact["set"] == one.set_name].to_dict("records")]
-    return pd.DataFrame([row for rows in threaded(_found_beside, jobs, tick) for row in rows])
+    return pd.DataFrame([row for rows in each(_found_beside, jobs) for row in rows])
 
 
 def _found_beside(job: tuple[Conditions, Any]) -> list[dict[str, Any]]:
@@ -218,7 +218,7 @@ def _found_beside(job: tuple[Conditions, Any]) -> list[dict[str, Any]]:
 
 
 def conditions_tables(
-    grid: Grid | None = None, conditions: Sequence[Conditions] | None = None, tick: Tick = lambda: None
+    grid: Grid | None = None, conditions: Sequence[Conditions] | None = None, each: Each = threaded
 ) -> dict[str, pd.DataFrame]:
     """Search chapter 4's and chapter 2's conditions that are not printed.
 
@@ -228,8 +228,8 @@ def conditions_tables(
         :func:`usual_grid` unless given.
     conditions
         All four unless given.
-    tick
-        Called after every piece of work.
+    each
+        Where the pieces of work are done.
 
     Returns
     -------
@@ -243,17 +243,15 @@ def conditions_tables(
     grid = grid or usual_grid()
     conditions = every_condition() if conditions is None else conditions
     exact, pade = ([one for one in conditions if one.delay == delay] for delay in DELAYS)
-    scan = scanned(exact, grid.scan, tick)
-    separate = alone(exact, scan, tick)
+    scan = scanned(exact, grid.scan, each)
+    separate = alone(exact, scan, each)
     if pade:
-        scan = pd.concat([scan, scanned(pade, grid.scan[::3], tick)], ignore_index=True)
-        separate = pd.concat([separate, approximated(pade, separate, tick)], ignore_index=True)
-    joint = together(conditions, grid_of(exact, grid, tick), tick)
+        scan = pd.concat([scan, scanned(pade, grid.scan[::3], each)], ignore_index=True)
+        separate = pd.concat([separate, approximated(pade, separate, each)], ignore_index=True)
+    joint = together(conditions, grid_of(exact, grid, each), each)
     sets = list(dict.fromkeys(one.set_name for one in conditions))
-    chapter_2 = delay_free_scan(sets, tick=tick)
-    summary = pd.concat(
-        [separate.assign(search="alone"), joint, delay_free_rows(sets, chapter_2, tick)], ignore_index=True
-    )
+    chapter_2 = delay_free_scan(sets, each=each)
+    summary = pd.concat([separate.assign(search="alone"), joint, delay_free_rows(sets, chapter_2)], ignore_index=True)
     columns = ["search", *(name for name in summary if name != "search")]
     both = pd.concat([scan.assign(case="extended"), chapter_2.assign(case="delay_free")], ignore_index=True)
     return {

@@ -91,7 +91,8 @@ def where_met(
         place = grid.index(min(grid, key=lambda limit: abs(miss(limit))))
         around = grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)]
         options: Any = {"maxiter": 12, "xatol": _NEAREST * around[1]}
-        minimize_scalar(lambda limit: abs(miss(limit)), bounds=around, method="bounded", options=options)
+        if len({known[grid[place]], *(known[limit] for limit in around)}) > 1:  # else it stays what it is
+            minimize_scalar(lambda limit: abs(miss(limit)), bounds=around, method="bounded", options=options)
     cuts = {grid[0], grid[-1]}
     for level in (printed.value - printed.half_unit, printed.value, printed.value + printed.half_unit):
         for left, right in passed(level):

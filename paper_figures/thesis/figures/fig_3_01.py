@@ -55,6 +55,3 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     diagram.signal(3.2, main, "$y$")
     diagram.signal(plant.x, plant.north[1], "$P(s)$")
     return diagram.figure()
-
-
-# 17129
