@@ -17,9 +17,8 @@ from design.design_file import Design
 from experiments.campaign.checkpoint import CampaignFile
 from experiments.campaign.distributions import PERCENT, RUNS, campaign_tables
 from experiments.campaign.run_plants import Campaign, run_chunk
-from experiments.engine.simulate import limits_text
-from experiments.runs.guarantee import sector_text
 from experiments.runs.references import Reference
+from experiments.runs.words import limits_text, sector_text
 from experiments.runs.workers import WorkersLostError, spread
 from identification.base import process
 from identification.base.errors import InputError

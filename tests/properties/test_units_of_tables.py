@@ -23,7 +23,8 @@ from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies import f_gamma, hidden_modes, interpolation, trade_off
 from experiments.thesis.studies.additive_error import additive_error_tables
 from experiments.thesis.studies.chapter_2 import delay_free_tables
-from experiments.thesis.studies.chapter_4 import desaturation, extended_tables, usual_limit
+from experiments.thesis.studies.chapter_4 import extended_tables, usual_limit
+from experiments.thesis.studies.desaturation import desaturation
 from experiments.thesis.studies.f_gamma import f_gamma_tables
 from experiments.thesis.studies.hidden_modes import hidden_modes_tables
 from experiments.thesis.studies.interpolation import interpolation_tables

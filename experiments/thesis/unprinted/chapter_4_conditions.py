@@ -19,7 +19,8 @@ from experiments.engine.simulate import DivergenceError, simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference
 from experiments.thesis.printed_choices import chapter_4, thesis_reference
-from experiments.thesis.studies.chapter_4 import PADE_ORDER, PERIODS
+from experiments.thesis.studies.chapter_4 import PADE_ORDER
+from experiments.thesis.studies.desaturation import PERIODS
 from experiments.thesis.unprinted.printed_outcomes import OUTCOMES, with_anti_windup, without_anti_windup
 
 SETS = ("implied", "table")
