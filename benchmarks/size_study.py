@@ -27,7 +27,6 @@ HORIZON_S, RATE_HZ = 1e4, 2000.0
 IMPORTS = "from experiments.campaign import checkpoint, distributions, run_plants; import pyarrow.parquet"
 CAMPAIGN = """
 import sys, numpy as np
-from itertools import chain
 from pathlib import Path
 from design.design_file import read_design
 from experiments.campaign import run_campaign

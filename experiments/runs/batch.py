@@ -7,13 +7,14 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from tqdm import tqdm
 
 from design.design_file import Asked, Design
+from experiments.engine.ready_loop import ReadyLoop, ready_loop
 from experiments.engine.simulate import Run, limit_pair, simulate_watched
 from experiments.engine.watched import STOP, watch
 from experiments.runs.design_loop import Controller, plant_loop, realized_controller
@@ -87,19 +88,35 @@ def simulate_many(
     if count < 1:
         raise InputError(f"{count} workers are asked for; expected one at least")
     controllers = {name: realized_controller(design, kind) for name, kind in anti_windups.items()}
-    cases = (Case(plant, *rest) for plant in plants for rest in itertools.product(references, anti_windups, limits))
-    return _streamed(cases, controllers, time_s, count)
+    return _streamed(_cases(plants, references, controllers, limits), time_s, count)
+
+
+def _cases(
+    plants: Iterable[PlantModel],
+    references: Sequence[Reference | SampledReference],
+    controllers: Mapping[str, Controller],
+    limits: Sequence[float | tuple[float, float]],
+) -> Iterator[tuple[Case, Callable[[], ReadyLoop]]]:
+    """Each case with what makes its loop, which is made once for all limits."""
+    for plant in plants:
+        for reference, (name, controller) in itertools.product(references, controllers.items()):
+            loop = cache(partial(_ready, controller, plant, reference))
+            for limit in limits:
+                yield Case(plant, reference, name, limit), loop
+
+
+def _ready(controller: Controller, plant: PlantModel, reference: Reference | SampledReference) -> ReadyLoop:
+    return ready_loop(plant_loop(controller, plant, reference))
 
 
 def _streamed(
-    cases: Iterator[Case], controllers: Mapping[str, Controller], time_s: np.ndarray, workers: int
+    cases: Iterator[tuple[Case, Callable[[], ReadyLoop]]], time_s: np.ndarray, workers: int
 ) -> Iterator[tuple[Case, Run | InputError]]:
     state = watch()
 
-    def run(case: Case) -> Run | InputError:
+    def run(case: Case, loop: Callable[[], ReadyLoop]) -> Run | InputError:
         try:
-            loop = plant_loop(controllers[case.anti_windup], case.plant, case.reference)
-            return simulate_watched(loop, limit_pair(case.limit), time_s, state)
+            return simulate_watched(loop(), limit_pair(case.limit), time_s, state)
         except InputError as error:
             return error
 
@@ -108,7 +125,8 @@ def _streamed(
         try:
             while True:
                 ahead.extend(
-                    (case, pool.submit(run, case)) for case in itertools.islice(cases, IN_FLIGHT * workers - len(ahead))
+                    (case, pool.submit(run, case, loop))
+                    for case, loop in itertools.islice(cases, IN_FLIGHT * workers - len(ahead))
                 )
                 if not ahead:
                     return

@@ -40,7 +40,7 @@ def _response(structure: Structure, theta: Real, omega: Real) -> tuple[Complex, 
     real_factors.imag = omega / rate
     value = np.exp(theta[0] - 1j * theta[-1] * omega)
     if integrators:
-        value /= (1j * omega) ** integrators
+        value *= 1j**-integrators * omega ** -float(integrators)
     for row in (*factors[:zeros], *real_factors[:real_zeros]):
         value *= row
     for row in (*factors[zeros:], *real_factors[real_zeros:]):
@@ -148,18 +148,20 @@ def least_squares(
     cost, slope, curvature = normal_equations(structure, theta, omega, response, sigma, soft=soft)
     damping, scale = 1e-3, np.zeros(theta.size)
     for _ in range(EVALUATIONS):
-        scale = np.maximum(scale, np.diag(curvature))
+        scale = np.maximum(scale, curvature.diagonal())
         free = np.flatnonzero(((theta > lower) | (slope < 0)) & ((theta < upper) | (slope > 0)) & (scale > 0))
         if not free.size:
             break
         unit = np.sqrt(scale[free])
-        scaled = curvature[np.ix_(free, free)] / np.outer(unit, unit)
+        scaled = curvature[free][:, free] / unit / unit[:, None]
         while True:
-            _, step, failed = dposv(scaled + damping * np.eye(free.size), -slope[free] / unit)
+            damped = scaled.copy()
+            damped.flat[:: free.size + 1] += damping
+            _, step, failed = dposv(damped, -slope[free] / unit)
             moved = theta.copy()
             if not failed:
                 moved[free] += step / unit
-                moved = np.clip(moved, lower, upper)
+                moved = np.minimum(np.maximum(moved, lower), upper)
                 reached, *there = normal_equations(structure, moved, omega, response, sigma, soft=soft)
                 if reached < cost:
                     break

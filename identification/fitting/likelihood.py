@@ -103,8 +103,9 @@ def _soft_factor(scaled: Real, factor: Real, least: float) -> Real:
     """Zero of mean(z/sqrt(1 + z)) - 1, z = scaled/factor, by Newton's method in log factor, row by row."""
     for _ in range(NEWTON):
         z = scaled / factor[:, None]
-        excess = np.mean(z / np.sqrt(1 + z), axis=1) - 1
-        slope = np.mean(z * (1 + z / 2) / (1 + z) ** 1.5, axis=1)
+        share = z / np.sqrt(1 + z)
+        excess = share.mean(axis=1) - 1
+        slope = (share * (0.5 + 0.5 / (1 + z))).mean(axis=1)
         step = np.clip(excess / np.maximum(slope, np.finfo(float).tiny), -1.0, 1.0)
         factor = np.maximum(factor * np.exp(step), least)
         if np.max(np.abs(step)) < CONVERGED:
@@ -155,11 +156,11 @@ def maximise(
     theta, sign = _with_gain(omega, response, sigma, structure, theta)
     lower, upper = _bounds(omega, structure, theta)
     best: Likely | None = None
+    theta = np.clip(theta, lower, upper)
+    response = lines.response - lines.aliases(structure, theta, sign)
     for _ in range(ALTERNATIONS if lines.held_s is None else ALIAS_TURNS):
-        start = np.clip(theta, lower, upper)
-        response = lines.response - lines.aliases(structure, start, sign)
         theta = least_squares(
-            structure, start, omega, sign * response, sigma, (lower, upper), soft=soft, tolerance=tolerance
+            structure, theta, omega, sign * response, sigma, (lower, upper), soft=soft, tolerance=tolerance
         )
         model = response_of(structure, theta, omega)
         response = lines.response - lines.aliases(structure, theta, sign)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
@@ -208,7 +209,7 @@ def test_first_time_within_a_band_from_rest() -> None:
     rest = RestLimit(integrator(7.105, 0.3), CHAPTER_4, 14.0, steps=60)
     found = rest.settling(0.5)
     starts = np.linspace(0.3, 1.5, 481)
-    exact = next(t for t in starts if floor_of_slopes(CHAPTER_4, 7.105 * 14.0, t, 4.0, 0.3) <= 0.5)
+    exact = starts[bisect_left(starts, -0.5, key=lambda t: -floor_of_slopes(CHAPTER_4, 7.105 * 14.0, t, 4.0, 0.3))]
     assert found.lower <= exact <= found.upper + starts[1] - starts[0]
     assert found.upper - found.lower <= 2.01 * (rest.start_s(1) - rest.start_s(0))
     assert rest.settling(51.0) == Interval(0.0, 0.0)

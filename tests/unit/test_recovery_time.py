@@ -48,7 +48,7 @@ def least_f(
     return found.f, found.f_lower
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(
     bounds,
     st.lists(st.floats(0.0, 2.5), min_size=3, max_size=3),
@@ -73,7 +73,7 @@ def test_f_of_a_plant_that_once_showed_the_opposite() -> None:
     plant = PlantModel(19.416211763234617, (), (Mode(64.83351679861622, 0.006065211741852967),), 0.04289450322705625)
     plant = PlantModel(plant.gain, (Mode(13.998610151745932, 0.0081),), plant.pole_modes, plant.delay_s)
     bound = AdditiveBound(0.0930769359974999, (), (), (), (23.246528149884053,))
-    times = (0.08, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+    times = (0.08, 0.2, 1.0, 10.0)
     found = [
         design_extended(IdentifiedModel(plant, bound), [1.5], 4.0, [(2.0, 1.0)], recovery_s=time).corrected
         for time in times
@@ -84,7 +84,7 @@ def test_f_of_a_plant_that_once_showed_the_opposite() -> None:
     assert all(each.recovery_s <= time * (1 + 1e-9) for each, time in zip(judged, times, strict=True))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(bounds, st.floats(-9.0, 9.0), st.floats(-15.0, 15.0), st.integers(0, 2), st.floats(0.2, 2.0))
 def test_the_units_do_not_matter(
     bound: AdditiveBound, time_unit: float, gain_unit: float, integrators: int, decades: float
