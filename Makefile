@@ -20,6 +20,7 @@ TIMES ?= 5
 
 PY := .venv/bin/python
 READY := .venv/.ready
+COMPILED = $(dir $(READY)).compiled
 BENCH_READY := .venv/.bench-ready
 AUDIT_READY := .venv/.audit-ready
 
@@ -44,11 +45,11 @@ help: ## say what there is
 	@echo 'make refit ... LIMIT="-3 12"    the saturation limits alone; LIMIT=5 for +-5, with make figures too'
 	@echo 'make ... PLANTS=10000    as many plants drawn within W_a, 200 otherwise (Fig. A.6); JOBS=1 one step at a time'
 	@echo 'make ... FORCE=yes    replace files of yours that stand in the place of an output'
-figures: $(READY) ## draw the thesis's figures and A.1 to A.9 into build/figures
+figures: $(COMPILED) ## draw the thesis's figures and A.1 to A.9 into build/figures
 	@$(PY) -m antiwindup.from_make figures
-report: $(READY) ## put verdicts, figures with data, ledger, fit, audits and hashes on one page, build/report/index.html
+report: $(COMPILED) ## put verdicts, figures with data, ledger, fit, audits and hashes on one page, build/report/index.html
 	@$(PY) -m antiwindup.from_make report
-refit: $(READY) ## fit SWEEPS="a.csv b.csv", design, simulate, draw and sum up for that plant into OUT
+refit: $(COMPILED) ## fit SWEEPS="a.csv b.csv", design, simulate, draw and sum up for that plant into OUT
 	@$(PY) -m antiwindup.from_make refit
 claims: $(READY) ## recompute what the thesis claims and say what agrees: build/claims/claims.csv, CLAIMS.md, docs/equations.md
 	@mkdir -p build/claims
@@ -63,7 +64,7 @@ bench: $(BENCH_READY) ## measure speed against peers (needs a C compiler), the m
 	$(PY) benchmarks/closed_loop_cost.py --output build/bench
 	$(PY) benchmarks/size_study.py
 	$(PY) benchmarks/scaling_study.py
-bench-build: $(READY) ## measure, TIMES times each, what a user waits for: figures, report, refit, first page, --help, a first figure
+bench-build: $(COMPILED) ## measure, TIMES times each, what a user waits for: figures, report, refit, first page, --help, a first figure
 	@mkdir -p build/bench
 	$(PY) -m benchmarks.build_study --times="$$ANTIWINDUP_TIMES" --output=build/bench
 study: $(READY) ## fit hundreds of synthetic sets: success, distance from the Cramer-Rao bound, coverage, time
@@ -91,6 +92,11 @@ $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -m venv .venv
 	$(PY) -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements.lock
 	$(PY) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --no-index --editable .
+	@touch $@
+
+# Compiled code is kept in the user's cache folder; once it is there, no command waits for it.
+$(COMPILED): $(READY) $(shell grep -rsl --include=*.py @njit identification design experiments)
+	@$(PY) -m antiwindup.compile_ahead
 	@touch $@
 
 # What `make bench` and `make audit` need beyond that.

@@ -1,35 +1,25 @@
-/* The algorithm of experiments/engine/integrator.py, propagator.py, mesh.py and crossings.py in plain C: the limit of its speed.
+/* The method of experiments/engine in plain C, written for one loop: what the engine's speed is measured against.
 
-   The tables come from Python, as they do there. References in pieces are left out: the benchmark has none. */
+   Every step is the recursion x_{p+1} = step/(p + 1) (A x_p + B m_p + D w_p), term by term, as straight code for the
+   entries of the loop that are not zero: of second-order sections in series no more are. That code, N, K, WATCHED, MOST,
+   rate_0 and rate_1 (unsaturated and saturated), signals_0 ... and watched_0 ..., is in loop.h, which compiled_c.py
+   writes. References in pieces, brief dead times and rate limits are left out: the benchmark has none. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "loop.h"
 
 #define ORDER 60
 #define NEGLIGIBLE 1e-14
 #define ROUNDING 1e-16
 #define NOTHING 1e-30
 #define DIVERGENT 1e100
-#define LANES 16
-#define LANED(count) (((count) + LANES - 1) / LANES * LANES)
 #define BEYOND 0.5
 #define JUMP 1e-9
-#define MOST 256 /* states, delayed signals and watched signals, each */
-
-typedef struct {
-    const uint32_t *indptr, *indices;
-    const double *data;
-} Sparse;
 
 static double binomial[ORDER + 1][ORDER + 1], factorial[ORDER + 1], inverse[ORDER + 1];
-
-static inline double times(const Sparse *matrix, int r, const double *restrict v) {
-    double value = 0.0;
-    for (uint32_t q = matrix->indptr[r]; q < matrix->indptr[r + 1]; q++)
-        value += matrix->data[q] * v[matrix->indices[q]];
-    return value;
-}
 
 static inline double dot(const double *restrict row, const double *restrict z, int count) {
     double value = 0.0;
@@ -58,35 +48,6 @@ static double gap(double *left, int left_degree, double moved, const double *rig
     for (int i = 0; i <= left_degree || i <= right_degree; i++, power *= 0.5)
         most += fabs((i <= left_degree ? left[i] : 0.0) - (i <= right_degree ? right[i] : 0.0)) * power;
     return most;
-}
-
-static void advance(const Sparse *restrict matrix, const double *influence, double *restrict V, int stride, int n,
-                    int known, int most, double *restrict scale, double step, double reach, double *restrict x) {
-    double power = 1.0;
-    memcpy(x, V, n * sizeof *x);
-    for (int i = 0; i < most; i++) {
-        double *now = V + i * stride, *following = now + stride, factor = step / (i + 1);
-        int negligible = i >= known;
-        power *= reach;
-        for (int r = 0; r < n; r++) {
-            double term = factor * times(matrix, r, now);
-            following[r] = term;
-            term *= power;
-            x[r] += term;
-            scale[r] = fmax(scale[r], fabs(x[r]));
-            if (negligible && fabs(term) > NEGLIGIBLE * scale[r]) negligible = 0;
-        }
-        for (int r = 0; r < n && negligible; r++) {
-            double bound = 0.0;
-            for (int c = 0; c < n; c++) bound += influence[r * LANED(n) + c] * fabs(following[c]);
-            negligible = bound * power * reach <= (i + 2) * NEGLIGIBLE * scale[r];
-        }
-        if (negligible) break;
-    }
-}
-
-static void state_terms(const double *terms, int wide, int degree, const double *z, int columns, double *size, int n) {
-    for (int r = 0; r < n; r++) size[r] = fabs(dot(terms + (size_t)(n * degree + r) * wide, z, columns));
 }
 
 static int sign_changes(const double *b, int n) {
@@ -199,50 +160,44 @@ static int insert(double *queue, int queued, double t, double near) {
     return queued + 1;
 }
 
-/* The number of events; values (1 + watched, count), events (most_events,). -1: divergence, -2: too little room. */
-int integrate(const uint32_t *indptr, const uint32_t *indices, const double *data, const uint32_t *indptr_m,
-              const uint32_t *indices_m, const double *data_m, const double *increments, const double *polynomials,
-              const double *terms, const double *magnitudes, const double *influence, int n, int k, int watched, int most, int wide, const double *delays, const double *x0, double low, double high,
-              double horizon, double step, const double *samples, const int64_t *groups, int lags,
-              int count, int most_events, int room, double *values, double *events) {
-    const Sparse unsaturated = {indptr, indices, data}, saturated = {indptr_m, indices_m, data_m};
-    int stride = n + 1 + k, signals = 1 + k + watched, pieces = 0, event_count = 0, wrap = room - 1;
-    if (stride > MOST || signals > MOST || most > ORDER) return -2;
+/* The number of events; values (1 + WATCHED, count), events (most_events,). -1: divergence, -2: too little room. */
+int integrate(const double *influence, const double *delays, const double *x0, double low, double high, double horizon,
+              double step, const double *samples, const int64_t *groups, int lags, int count, int most_events, int room,
+              double *values, double *events) {
+    int pieces = 0, event_count = 0, wrap = room - 1;
     for (int i = 0; i <= ORDER; i++) /* binomial[i][n] = n over i: rows that run with n */
         for (int m = 0; m <= ORDER; m++)
             binomial[i][m] = i == 0 ? 1.0 : m == 0 ? 0.0 : binomial[i - 1][m - 1] + binomial[i][m - 1];
     for (int i = 0; i <= ORDER; i++) factorial[i] = i ? i * factorial[i - 1] : 1.0, inverse[i] = 1.0 / factorial[i];
     double *starts = malloc(room * sizeof *starts), *radii = malloc(room * sizeof *radii);
-    double *lates = malloc(room * sizeof *lates), late = 0.0;
-    double *queue = malloc(room * sizeof *queue);
-    int *degrees = malloc(room * sizeof *degrees), queued = 0, cursor[MOST] = {0}, filled[MOST] = {0};
-    int sample[MOST] = {0};
-    double *history = malloc((size_t)room * k * (most + 1) * sizeof *history);
-#define PIECE(p, j) (history + ((size_t)((p) & wrap) * k + (j)) * (most + 1))
-    double *V = calloc((size_t)(most + 1) * stride, sizeof *V), *z = calloc(wide, sizeof *z), W[ORDER + 1];
-    double *sizes = calloc(wide, sizeof *sizes), now[MOST], later[MOST], negligible[MOST];
-    double P[MOST][ORDER + 1], x[MOST], scale[MOST], size[MOST] = {0}, seen[MOST] = {0}, rest[MOST];
-    memcpy(V, x0, n * sizeof *V);
-    for (int j = 0; j < k; j++) rest[j] = times(&unsaturated, n + 1 + j, V);
-    for (int j = 0; j < k; j++) V[n + 1 + j] = rest[j], size[1 + j] = fabs(rest[j]);
-    for (int r = 0; r < n; r++) x[r] = x0[r], scale[r] = fabs(x0[r]);
+    double *lates = malloc(room * sizeof *lates), late = 0.0, *queue = malloc(room * sizeof *queue);
+    int *degrees = malloc(room * sizeof *degrees), queued = 0, cursor[K + 1] = {0}, sample[K + 2] = {0};
+    double(*history)[K][MOST + 1] = malloc(room * sizeof *history);
+    static double V[MOST + 2][N + 1 + K], S[MOST + 2][1 + K], O[MOST + 2][WATCHED + 1];
+    double W[K][ORDER + 1], P[1 + K][ORDER + 1], x[N], scale[N], size[1 + K] = {0}, negligible[1 + K], rest[K + 1];
+    memset(V, 0, sizeof V);
+    memcpy(V[0], x0, N * sizeof **V);
+    signals_0(V[0], S[0]);
+    for (int j = 0; j < K; j++) rest[j] = S[0][1 + j];
+    for (int j = 0; j < K; j++) V[0][N + 1 + j] = rest[j], size[1 + j] = fabs(rest[j]);
+    for (int r = 0; r < N; r++) x[r] = x0[r], scale[r] = fabs(x0[r]);
+    watched_0(V[0], O[0]);
     for (int g = 0; g < lags; g++)
         for (; sample[g] < count && samples[g * count + sample[g]] < 0; sample[g]++)
-            for (int o = groups[g]; o < groups[g + 1]; o++)
-                values[(1 + o) * count + sample[g]] = times(&unsaturated, n + 1 + k + o, V);
-    double u = times(&unsaturated, n, V), t = 0.0;
+            for (int o = groups[g]; o < groups[g + 1]; o++) values[(1 + o) * count + sample[g]] = O[0][o];
+    signals_0(V[0], S[0]);
+    double u = S[0][0], t = 0.0;
     int mode = u > high ? 1 : u < low ? -1 : 0, kink = 1, on_limit = 0, standing = 0, result = 0, usual = 0;
 
     while (t < horizon && !result) {
         double t_next = fmin(t + step, horizon), radius;
         if (queued && queue[0] - t < step * (1 + 1e-9)) t_next = fmin(queue[0], horizon);
-        int known = 0, degree, quiet = 0;
-        for (int j = 0; j < k; j++) {
-            for (int i = 0; i <= filled[j]; i++) z[n + 1 + k * i + j] = 0.0;
-            filled[j] = 0;
+        int known = 0, degree, quiet = 0, filled[K + 1];
+        for (int j = 0; j < K; j++) {
             double start = t - delays[j], middle = start + 0.5 * (t_next - t);
+            filled[j] = 0;
             if (middle < 0) {
-                z[n + 1 + j] = rest[j];
+                W[j][0] = rest[j];
                 continue;
             }
             while (cursor[j] + 1 < pieces && starts[(cursor[j] + 1) & wrap] <= middle) cursor[j]++;
@@ -250,52 +205,44 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
             if (starts[piece] + radii[piece] * step + delays[j] < t_next - 1e-9 * step)
                 t_next = starts[piece] + radii[piece] * step + delays[j];
             degree = degrees[piece];
-            memcpy(W, PIECE(piece, j), (degree + 1) * sizeof *W);
+            memcpy(W[j], history[piece][j], (degree + 1) * sizeof **W);
             double moved = start - starts[piece] + (late - lates[piece]);
-            if (fabs(moved) > 4e-16 * (step + t)) shift(W, degree, moved / step);
+            if (fabs(moved) > 4e-16 * (step + t)) shift(W[j], degree, moved / step);
             radius = fmin(1.0, (t_next - t) / step + BEYOND);
-            double power = pow(radius, degree);
-            for (; degree > 0 && fabs(W[degree]) * power <= NEGLIGIBLE * size[1 + j]; degree--) power /= radius;
-            for (int i = 0; i <= degree; i++) z[n + 1 + k * i + j] = W[i];
+            double power = radius == 1.0 ? 1.0 : pow(radius, degree);
+            for (; degree > 0 && fabs(W[j][degree]) * power <= NEGLIGIBLE * size[1 + j]; degree--) power /= radius;
             filled[j] = degree;
             if (degree > known) known = degree;
         }
-        const double *increment = increments, *polynomial = polynomials, *term = terms, *magnitude = magnitudes;
-        const double *weight = influence;
-        if (mode) {
-            increment += (size_t)n * wide, polynomial += (size_t)signals * (most + 1) * wide;
-            term += (size_t)n * (most + 1) * wide, magnitude += (size_t)signals * wide;
-            weight += (size_t)(signals + n) * LANED(n);
-        }
-        memcpy(z, x, n * sizeof *z);
-        z[n] = mode == 0 ? 0.0 : mode == 1 ? high : low;
-        int columns = LANED(n + 1 + k * (known + 1));
+        for (int j = 0; j < K; j++)
+            for (int i = 0; i <= known; i++) V[i][N + 1 + j] = i <= filled[j] ? W[j][i] : 0.0;
+        memcpy(V[0], x, N * sizeof *x);
+        V[0][N] = mode == 0 ? 0.0 : mode == 1 ? high : low;
         double power = 1.0;
         radius = fmin(1.0, (t_next - t) / step + BEYOND);
-        for (int c = 0; c < columns; c++) sizes[c] = fabs(z[c]);
-        for (int s = 0; s <= k; s++) negligible[s] = ROUNDING * dot(magnitude + (size_t)s * wide, sizes, columns);
         for (degree = 0;; degree++, power *= radius) {
-            int small = degree > known, upto = small ? columns : LANED(n + 1 + k * (degree + 1));
-            for (int s = 0; s <= k; s++) {
-                double c = dot(polynomial + (size_t)(signals * degree + s) * wide, z, upto);
-                if (degree == 0) {
-                    size[s] = fmax(size[s], fabs(c));
-                    negligible[s] = fmax(negligible[s], NEGLIGIBLE * size[s]);
-                }
+            int small = degree > known;
+            if (degree > known) memset(V[degree] + N + 1, 0, K * sizeof **V);
+            if (degree > 0) V[degree][N] = 0.0;
+            if (mode) signals_1(V[degree], S[degree]), rate_1(V[degree], S[degree], step / (degree + 1), V[degree + 1]);
+            else signals_0(V[degree], S[degree]), rate_0(V[degree], S[degree], step / (degree + 1), V[degree + 1]);
+            for (int s = 0; s <= K; s++) {
+                double c = S[degree][s];
+                if (degree == 0) size[s] = fmax(size[s], fabs(c)), negligible[s] = NEGLIGIBLE * size[s];
                 P[s][degree] = fabs(c) > NOTHING * size[s] ? c : 0.0;
                 small = small && fabs(c) * power <= negligible[s];
             }
             quiet = small ? quiet + 1 : 0;
             if (quiet > 1 && degree >= usual - 1) {
-                state_terms(term, wide, degree, z, columns, now, n);
-                for (int s = 0; s <= k; s++)
-                    small = small && dot(weight + s * LANED(n), now, n) * power <= negligible[s] * (degree + 1);
+                for (int s = 0; s <= K; s++) {
+                    double bound = 0.0;
+                    const double *row = influence + ((mode ? 1 : 0) * (1 + K) + s) * N;
+                    for (int r = 0; r < N; r++) bound += row[r] * fabs(V[degree][r]);
+                    small = small && bound * power <= negligible[s] * (degree + 1);
+                }
                 if (small) break;
             }
-            if (degree == most) {
-                memset(now, 0, sizeof now);
-                break;
-            }
+            if (degree == MOST) break;
         }
         usual = degree;
         int whole = fabs(t_next - t - step) <= 1e-15 * (step + t), entered, crossed;
@@ -307,69 +254,47 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
             late_next = (late + reach * step) - (t_next - t);
         }
 
-        if (reach > 0 && k > 0) {
+        if (reach > 0 && K > 0) {
             int piece = pieces & wrap, left = (pieces - 1) & wrap;
-            for (int j = 0; j < k; j++)
-                if (pieces - cursor[j] >= room || queued + k > room) result = -2;
+            for (int j = 0; j < K; j++)
+                if (pieces - cursor[j] >= room || queued + K > room) result = -2;
             if (result) break;
             starts[piece] = t, lates[piece] = late, radii[piece] = radius, degrees[piece] = degree;
-            for (int j = 0; j < k; j++) {
-                memcpy(PIECE(piece, j), P[1 + j], (degree + 1) * sizeof(double));
+            for (int j = 0; j < K; j++) {
+                memcpy(history[piece][j], P[1 + j], (degree + 1) * sizeof(double));
                 if (!kink) continue;
                 int before = pieces ? degrees[left] : 0;
-                double moved = pieces ? (t - starts[left] + (late - lates[left])) / step : 0.0;
-                memcpy(W, pieces ? PIECE(left, j) : rest + j, (before + 1) * sizeof *W);
-                if (gap(W, before, moved, P[1 + j], degree) > negligible[1 + j])
+                double moved = pieces ? (t - starts[left] + (late - lates[left])) / step : 0.0, L[ORDER + 1];
+                memcpy(L, pieces ? history[left][j] : rest + j, (before + 1) * sizeof *L);
+                if (gap(L, before, moved, P[1 + j], degree) > negligible[1 + j])
                     queued = insert(queue, queued, t + delays[j], 1e-13 * (step + t));
             }
             kink = 0;
             pieces++;
         }
+        int made = 0;
         for (int g = 0; g < lags; g++) {
             const double *at = samples + g * count;
             int begin = sample[g], until = begin;
             while (until < count && (at[until] < t_next || t_next >= horizon)) until++;
             if (until == begin) continue;
             sample[g] = until;
-            for (int o = g == 0 ? -1 : groups[g]; o < groups[g + 1]; o++) {
-                int top = degree;
-                if (o >= 0) {
-                    int row = 1 + k + o;
-                    for (int i = 0; i <= top; i++)
-                        W[i] = dot(polynomial + (size_t)(signals * i + row) * wide, z, columns);
-                    seen[o] = fmax(seen[o], fabs(W[0]));
-                    double rounding = ROUNDING * dot(magnitude + (size_t)row * wide, sizes, columns);
-                    double bound = dot(weight + row * LANED(n), now, n) / (top + 1);
-                    while (top < most && bound > fmax(NEGLIGIBLE * seen[o], rounding)) {
-                        top++;
-                        W[top] = dot(polynomial + (size_t)(signals * top + row) * wide, z, columns);
-                        state_terms(term, wide, top, z, columns, later, n);
-                        bound = dot(weight + row * LANED(n), later, n) / (top + 1);
-                    }
-                    double left_out = fabs(W[top]);
-                    while (top > 0 && left_out <= ROUNDING * seen[o]) left_out += fabs(W[--top]);
+            for (; made <= degree; made++) mode ? watched_1(V[made], O[made]) : watched_0(V[made], O[made]);
+            for (int o = g == 0 ? -1 : groups[g]; o < groups[g + 1]; o++)
+                for (int s = begin; s < until; s++) {
+                    double tau = (at[s] - t - late) / step, value = 0.0;
+                    for (int i = degree; i >= 0; i--) value = value * tau + (o < 0 ? P[0][i] : O[i][o]);
+                    values[(1 + o) * count + s] = value;
                 }
-                for (int s = begin; s < until; s++)
-                    values[(1 + o) * count + s] = horner(o < 0 ? P[0] : W, top, (at[s] - t - late) / step);
+        }
+        if (reach > 0) {
+            double factor = 1.0;
+            for (int i = 1; i <= degree; i++) {
+                factor *= reach;
+                for (int r = 0; r < N; r++) x[r] += factor * V[i][r];
             }
         }
-        if (reach == 1.0) {
-            for (int r = 0; r < n; r++) x[r] += dot(increment + (size_t)r * wide, z, columns);
-        } else if (reach > 0) {
-            for (int i = 0; i <= known; i++) memcpy(V + i * stride + n + 1, z + n + 1 + k * i, k * sizeof *V);
-            memcpy(V, z, (n + 1) * sizeof *V);
-            int driven = 0;
-            for (int j = 0; j < k; j++) {
-                int top = filled[j];
-                double power = pow(reach, top);
-                for (; top > driven && fabs(z[n + 1 + k * top + j]) * power <= NEGLIGIBLE * size[1 + j]; top--)
-                    power /= reach;
-                if (top > driven) driven = top;
-            }
-            advance(mode ? &saturated : &unsaturated, weight + signals * LANED(n), V, stride, n, driven, most, scale, step, reach, x);
-            for (int i = 0; i <= known; i++) memset(V + i * stride + n + 1, 0, k * sizeof *V);
-        }
-        for (int r = 0; r < n; r++) {
+        for (int r = 0; r < N; r++) {
             scale[r] = fmax(scale[r], fabs(x[r]));
             if (fabs(x[r]) < NOTHING * scale[r]) x[r] = 0.0;
             if (!(fabs(x[r]) < DIVERGENT)) result = -1;
@@ -386,6 +311,6 @@ int integrate(const uint32_t *indptr, const uint32_t *indices, const double *dat
         queued -= passed;
         if (passed) memmove(queue, queue + passed, queued * sizeof *queue);
     }
-    free(starts), free(lates), free(radii), free(queue), free(degrees), free(history), free(V), free(z), free(sizes);
+    free(starts), free(lates), free(radii), free(queue), free(degrees), free(history);
     return result ? result : event_count;
 }

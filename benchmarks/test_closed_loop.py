@@ -124,9 +124,11 @@ def test_against_dop853_by_steps(loop: SaturatedLoop, against: Callable[..., Non
     )
 
 
-def test_against_c(loop: SaturatedLoop, against: Callable[..., None]) -> None:
-    """The whole run, a sample every 10 ms: all of ours, its setting up too, against the same algorithm in C alone."""
-    time_s = times(WHOLE_S)[::10]
+@pytest.mark.parametrize("kind", ["none", "thesis"])
+def test_against_c(design: Design, against: Callable[..., None], kind: str) -> None:
+    """The whole run, a sample a millisecond: all of ours, its setting up too, against straight C code for this loop."""
+    loop = design_loop(design, thesis_reference("extended", [1.5]), kind)
+    time_s = times(WHOLE_S)
 
     def error(ours: Run, theirs: np.ndarray) -> str:
         return f"{WHOLE_S:g} s: {off(theirs, np.array(list(ours.outputs.values()))):.1e} of all outputs"

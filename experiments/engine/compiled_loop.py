@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.engine.saturated_loop import SaturatedLoop
-from experiments.engine.step_table import Rows, Tables, compressed, tabulate, whole_lanes
+from experiments.engine.step_table import Rows, Tables, compressed, tabulate
 from identification.base.errors import InputError
 
 FURTHEST = 4.0  # fastest root times step: the terms of a series grow to exp of it, and two digits are lost
@@ -36,9 +36,9 @@ class CompiledLoop(NamedTuple):
         stands for what the dead time changes, Z_j x(t - h_j) - Z_j x(t).
     step
         The tables', in seconds, not more than any dead time that is not brief.
-    groups, lags
-        Shapes (g + 1,), (g,): groups[i] ... groups[i + 1] - 1 of what is watched is sampled lags[i] seconds earlier;
-        the first lag is zero.
+    groups, reads, lags
+        Shapes (g + 1,), (watched,), (g,): groups[i] ... groups[i + 1] - 1 of what is watched is sampled lags[i] seconds
+        earlier, and is the signal reads[i] of the tables; the first lag is zero.
     reading
         Shape (outputs, watched): makes the loop's outputs of what is watched.
     """
@@ -53,6 +53,7 @@ class CompiledLoop(NamedTuple):
     x0: np.ndarray
     step: float
     groups: np.ndarray
+    reads: np.ndarray
     lags: np.ndarray
     reading: np.ndarray
 
@@ -67,10 +68,11 @@ def compile_loop(
     """Merge the delayed signals that enter the loop alike, choose the step, and tabulate it.
 
     The step is set by the fastest eigenvalue of the loop, saturated or not, and by the shortest dead time that is not
-    brief, of which it is a whole part: then most delayed polynomials are read where they start. It is halved until all
-    series end. A dead time is brief up to ``most_brief`` time constants of the fastest eigenvalue: the loop is taken
-    without it, and what it changes is found in each step. Where nothing sets a step, ``idle_step`` seconds are one.
-    ``slews`` says that the last two states are those of an actuator with a rate limit.
+    brief, of which it is a whole part: then most delayed polynomials are read where they start. Without a rate limit
+    and brief dead times it is an even part, for steps twice as long. It is halved until all series end. A dead time is
+    brief up to ``most_brief`` time constants of the fastest eigenvalue: the loop is taken without it, and what it
+    changes is found in each step. Where nothing sets a step, ``idle_step`` seconds are one. ``slews`` says that the
+    last two states are those of an actuator with a rate limit.
     """
     now, direct = loop.delays == 0, _direct(loop)
     if np.any(loop.E[now] @ direct[now] != 0):
@@ -89,8 +91,8 @@ def compile_loop(
     watched, watched_direct, groups, lags, reading = _watched(loop)
     # what u - sat(u) drives is driven by zeros in the loop without saturation, and not by rounding
     free_A, free_D = A + np.outer(B, C), D + np.outer(B, E)
-    u, signals = np.concatenate([C, [0.0], E]), np.vstack([Z, watched])
-    of_m, of_limited, of_u = np.vstack([direct, watched_direct]).T
+    rows, reads = _each_once(np.hstack([Z, direct]), np.hstack([watched, watched_direct]))
+    u, signals, (of_m, of_limited, of_u) = np.concatenate([C, [0.0], E]), rows[:, :n], rows[:, n:].T
 
     def mode(A: np.ndarray, constant: np.ndarray, D: np.ndarray, m: np.ndarray, limited: np.ndarray) -> Rows:
         """Where m and sat(u) are rows over (x, the constant, w)."""
@@ -113,7 +115,8 @@ def compile_loop(
     step = min(FURTHEST / fastest if fastest > 0 else np.inf, most_step)
     if not brief.all():
         shortest = float(delays[~brief].min())
-        step = shortest / max(np.ceil(shortest / step), 1.0)
+        even = 1 if slews or brief.any() else 2  # so that steps twice as long are parts of it, too
+        step = shortest / (even * max(np.ceil(shortest / (even * step)), 1.0))
     elif np.isinf(step):
         step = idle_step  # of integrators alone, whose series end by themselves
     while True:
@@ -121,17 +124,19 @@ def compile_loop(
         if all(degree >= 0 for _, degree in tabulated):
             break
         step /= 2
+    tables = Tables(*(_stacked(alike) for alike in zip(*(each for each, _ in tabulated), strict=True)))
     return CompiledLoop(
         unsaturated=unsaturated,
         saturated=saturated,
         slewing=modes[-2],
         stopped=modes[-1],
-        tables=Tables(*(_stacked(alike) for alike in zip(*(tables for tables, _ in tabulated), strict=True))),
+        tables=tables._replace(terms=tables.terms.reshape(-1, *tables.terms.shape[2:])),
         delays=delays,
         brief=brief,
         x0=loop.x0,
         step=step,
         groups=groups,
+        reads=1 + reads,
         lags=lags,
         reading=reading,
     )
@@ -161,7 +166,12 @@ def _merged(loop: SaturatedLoop, direct: np.ndarray) -> tuple[np.ndarray, ...]:
 
 def _watched(loop: SaturatedLoop) -> tuple[np.ndarray, ...]:
     """What the outputs are made of: rows over x and direct, where each group begins, its lag, and the outputs' rows."""
-    used = [j for j in range(len(loop.delays)) if any(w[j] != 0 for _, w in loop.outputs.values())]
+    direct_of = _direct(loop)
+    used = [
+        j
+        for j in range(len(loop.delays))
+        if (loop.Z[j].any() or direct_of[j].any()) and any(w[j] != 0 for _, w in loop.outputs.values())
+    ]
     lags = sorted({0.0, *(float(loop.delays[j]) for j in used)})
     rows: list[np.ndarray] = []
     direct: list[np.ndarray] = []
@@ -177,7 +187,7 @@ def _watched(loop: SaturatedLoop) -> tuple[np.ndarray, ...]:
             if loop.delays[j] == lag:
                 delayed[j] = len(rows)
                 rows.append(loop.Z[j])
-                direct.append(_direct(loop)[j])
+                direct.append(direct_of[j])
         groups.append(len(rows))
     reading = np.zeros((len(loop.outputs), len(rows)))
     for into, (name, (_, w)) in zip(reading, loop.outputs.items(), strict=True):
@@ -189,10 +199,19 @@ def _watched(loop: SaturatedLoop) -> tuple[np.ndarray, ...]:
     return states, np.array(direct).reshape(len(rows), 3), np.array(groups), np.array(lags), reading
 
 
+def _each_once(delayed: np.ndarray, watched: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The rows that are delayed, those of what is watched that are not among them, and which of all is watched."""
+    rows, reads = list(delayed), []
+    for row in watched:
+        alike = [i for i, other in enumerate(rows) if np.array_equal(other, row)]
+        reads.append(alike[0] if alike else len(rows))
+        rows += [] if alike else [row]
+    return np.array(rows).reshape(len(rows), watched.shape[1]), np.array(reads, dtype=np.int64)
+
+
 def _stacked(tables: Sequence[np.ndarray]) -> np.ndarray:
-    """Tables on one another, filled with zeros to one size and to whole lanes."""
-    rows, columns = np.max([table.shape for table in tables], axis=0)
-    stack = np.zeros((len(tables), rows, whole_lanes(columns)))
+    """Tables on one another, filled with zeros to one size."""
+    stack = np.zeros((len(tables), *np.max([table.shape for table in tables], axis=0)))
     for into, table in zip(stack, tables, strict=True):
-        into[: table.shape[0], : table.shape[1]] = table
+        into[tuple(slice(size) for size in table.shape)] = table
     return stack

@@ -174,3 +174,14 @@ def leaves_mode(
             jumped = -g[0] > JUMP * (abs(limit) + abs(U[0]))
             best, entered, crossed = found, (side if mode == 0 else 0), (0 if jumped else side)
     return best, entered, crossed
+
+
+@njit(nogil=True)
+def stays(U: Array, degree: int, mode: int, low: float, high: float) -> bool:
+    """Whether a bound says that a control sum U_i tau^i stays in its mode for -1 <= tau <= 1."""
+    swing = 0.0
+    for i in range(1, degree + 1):
+        swing += abs(U[i])
+    if mode == 0:
+        return bool(low < U[0] - swing and U[0] + swing < high)
+    return bool(U[0] - swing > high if mode > 0 else U[0] + swing < low)

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.engine import integrator
+from experiments.engine import endings
 from experiments.engine.compiled_loop import BRIEF, FURTHEST, CompiledLoop, compile_loop
+from experiments.engine.integrator import integrate
 from experiments.engine.ready_loop import ReadyLoop, ready_loop
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.watched import Stopped, Tick, watched
@@ -172,7 +173,7 @@ def simulate_watched(
     most_events, room, brief = 4096, _room(compiled), BRIEF
     while True:
         _require_affordable(compiled, room, horizon)
-        values, events, modes, places, status, end, _, tail = integrator.integrate(
+        values, events, modes, places, status, end, _, tail = integrate(
             compiled._replace(x0=x0),
             own.resets.times_s,
             own.resets.values,
@@ -181,24 +182,24 @@ def simulate_watched(
             float(rate),
             time_s - compiled.lags[:, None],
             horizon,
-            integrator.Bounds(int(MOST_STEPS), most_events, room),
+            endings.Bounds(int(MOST_STEPS), most_events, room),
             watch,
         )
-        if status == integrator.CROWDED:
+        if status == endings.CROWDED:
             room *= 2
-        elif status == integrator.EVENTFUL:
+        elif status == endings.EVENTFUL:
             most_events *= 8
-        elif status == integrator.UNSETTLED or (status == integrator.COMPLETE and tail > TAIL):
-            brief = 0.0 if status == integrator.UNSETTLED else brief
+        elif status == endings.UNSETTLED or (status == endings.COMPLETE and tail > TAIL):
+            brief = 0.0 if status == endings.UNSETTLED else brief
             compiled = compile_loop(own, compiled.step / 2, brief, slews=slews)
             room = max(room, _room(compiled))
         else:
             break
-    if status == integrator.STOPPED:
+    if status == endings.STOPPED:
         raise Stopped
-    if status == integrator.DIVERGED:
+    if status == endings.DIVERGED:
         raise DivergenceError(end)
-    if status != integrator.COMPLETE:
+    if status != endings.COMPLETE:
         raise InputError(f"the loop could not be integrated: {len(events)} events up to t = {end:.6g} s")
     outputs, m = compiled.reading @ values[1:], values[0]
     if slews and len(events):
@@ -222,7 +223,7 @@ def _require_affordable(compiled: CompiledLoop, room: int, horizon: float) -> No
         if step > shortest / 2
         else (f"a root of the loop near {FURTHEST / step:.3g} rad/s asks for")
     )
-    if room * compiled.tables.increments.shape[2] > MOST_ROOM:
+    if room * compiled.tables.gains.shape[1] > MOST_ROOM:
         raise InputError(
             f"{asked} steps of {step:.3g} s, too many to remember in the longest dead time, "
             f"{compiled.delays.max():.3g} s; expected dead times that differ less, or a slower design"

@@ -44,7 +44,7 @@ NAMES = [
 def make(tmp_path: Path) -> Path:
     """A folder with the Makefile and a stand-in for Python."""
     shutil.copy(ROOT / "Makefile", tmp_path)
-    for name in ("requirements.lock", "pyproject.toml", "requirements-bench.lock", "ready"):
+    for name in ("requirements.lock", "pyproject.toml", "requirements-bench.lock", "ready", ".compiled"):
         (tmp_path / name).touch()
     python = tmp_path / "python"
     python.write_text(PYTHON, encoding="utf-8")
@@ -165,6 +165,7 @@ def test_every_target_is_in_the_help() -> None:
     text = run(ROOT, "help").stdout
     targets = [
         "help",
+        "bench-build",
         "figures",
         "report",
         "refit",
