@@ -20,6 +20,7 @@ TIMES ?= 5
 
 PY := .venv/bin/python
 READY := .venv/.ready
+COMPILED = $(dir $(READY)).compiled
 BENCH_READY := .venv/.bench-ready
 AUDIT_READY := .venv/.audit-ready
 
@@ -33,9 +34,9 @@ $(foreach name,$(filter-out BUILD OUT,$(GIVEN)),$(eval $(call hand,$(name))))
 figures report: export ANTIWINDUP_OUTPUT := $(value BUILD)
 refit: export ANTIWINDUP_OUTPUT := $(value OUT)
 
-.PHONY: help figures report refit claims test bench study referee fuzz faults audit lint clean
+.PHONY: help figures report refit claims test suite bench bench-build study referee fuzz faults audit lint clean
 help: ## say what there is
-	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 	@echo
 	@echo 'make figures MODEL=implied    redraw for the thesis'"'"'s own set (or table, or a model.json); ONLY=fig_2_01'
 	@echo 'make refit SWEEPS="a.csv b.mat folder" OUT=mine    from your own sweeps to mine/summary.pdf and mine/figures'
@@ -44,21 +45,28 @@ help: ## say what there is
 	@echo 'make refit ... LIMIT="-3 12"    the saturation limits alone; LIMIT=5 for +-5, with make figures too'
 	@echo 'make ... PLANTS=10000    as many plants drawn within W_a, 200 otherwise (Fig. A.6); JOBS=1 one step at a time'
 	@echo 'make ... FORCE=yes    replace files of yours that stand in the place of an output'
-figures: $(READY) ## draw the thesis's figures and A.1 to A.9 into build/figures
+figures: $(COMPILED) ## draw the thesis's figures and A.1 to A.9 into build/figures
 	@$(PY) -m antiwindup.from_make figures
-report: $(READY) ## put verdicts, figures with data, ledger, fit, audits and hashes on one page, build/report/index.html
+report: $(COMPILED) ## put verdicts, figures with data, ledger, fit, audits and hashes on one page, build/report/index.html
 	@$(PY) -m antiwindup.from_make report
-refit: $(READY) ## fit SWEEPS="a.csv b.csv", design, simulate, draw and sum up for that plant into OUT
+refit: $(COMPILED) ## fit SWEEPS="a.csv b.csv", design, simulate, draw and sum up for that plant into OUT
 	@$(PY) -m antiwindup.from_make refit
 claims: $(READY) ## recompute what the thesis claims and say what agrees: build/claims/claims.csv, CLAIMS.md, docs/equations.md
 	@mkdir -p build/claims
 	@$(PY) -m experiments thesis claims --output build/claims --page CLAIMS.md
 	@$(PY) -m experiments thesis equations --page docs/equations.md
-test: lint ## check style, types and everything else
+test: $(READY) ## check style, types and everything else
+	@$(MAKE) --no-print-directory --jobs=2 lint suite
+suite: $(READY) ## run the tests alone
 	$(PY) -m pytest -q -n 2 --dist loadfile
-bench: $(BENCH_READY) ## measure speed as ratios against peers, and the cost of a run (needs a C compiler)
+bench: $(BENCH_READY) ## measure speed against peers (needs a C compiler), the memory of large inputs, and how large work scales
 	$(PY) -m pytest -q -s benchmarks --benchmark-only --benchmark-columns=median,iqr,rounds
 	$(PY) benchmarks/closed_loop_cost.py --output build/bench
+	$(PY) benchmarks/size_study.py
+	$(PY) benchmarks/scaling_study.py
+bench-build: $(COMPILED) ## measure, TIMES times each, what a user waits for: figures, report, refit, first page, --help, a first figure
+	@mkdir -p build/bench
+	$(PY) -m benchmarks.build_study --times="$$ANTIWINDUP_TIMES" --output=build/bench
 study: $(READY) ## fit hundreds of synthetic sets: success, distance from the Cramer-Rao bound, coverage, time
 	$(PY) benchmarks/identification_study.py --sets="$$ANTIWINDUP_SETS"
 referee: $(READY) ## compare CASES (200) random cases of SEED with independent numerics, all that is said of them
@@ -66,10 +74,9 @@ referee: $(READY) ## compare CASES (200) random cases of SEED with independent n
 fuzz: $(READY) ## give the commands CASES (10000) damaged files, odd numbers and odd names of each kind, of SEED; faults: build/fuzz
 	$(PY) -m benchmarks.fuzz --cheap --cases="$${ANTIWINDUP_CASES:-10000}" --seed="$$ANTIWINDUP_SEED" --keep=build/fuzz
 	$(PY) -m benchmarks.fuzz --cases=100 --seed="$$ANTIWINDUP_SEED" --keep=build/fuzz
-faults: $(READY) ## interrupt, kill, starve and double the commands TIMES times each with SEED; measure large inputs
+faults: $(READY) ## interrupt, kill, starve and double the commands TIMES times each with SEED
 	$(PY) -m benchmarks.interrupts --times="$$ANTIWINDUP_TIMES" --seed="$$ANTIWINDUP_SEED"
 	$(PY) -m benchmarks.faults --times="$$ANTIWINDUP_TIMES" --seed="$$ANTIWINDUP_SEED"
-	$(PY) benchmarks/size_study.py
 audit: $(AUDIT_READY) ## look the locked packages up in the database of known vulnerabilities (needs the network)
 	.venv/bin/pip-audit --strict --disable-pip --requirement requirements.lock --requirement requirements-bench.lock
 lint: $(READY) ## check style and types
@@ -85,6 +92,11 @@ $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -m venv .venv
 	$(PY) -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements.lock
 	$(PY) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --no-index --editable .
+	@touch $@
+
+# Compiled code is kept in the user's cache folder; once it is there, no command waits for it.
+$(COMPILED): $(READY) $(shell grep -rsl --include=*.py @njit identification design experiments)
+	@$(PY) -m antiwindup.compile_ahead
 	@touch $@
 
 # What `make bench` and `make audit` need beyond that.

@@ -16,7 +16,7 @@ from pathlib import Path
 from antiwindup.code_files import code_of
 from antiwindup.output_folder import OutputFolder
 from antiwindup.steps import Step
-from antiwindup.worker import start
+from antiwindup.worker import load_ahead, start
 from identification.base.errors import InputError
 from identification.base.files import is_folder, note, write_whole
 from identification.base.folder_lock import locked_folder
@@ -147,6 +147,8 @@ class Build:
                 if self._settled(*(run := waiting.pop(0))):
                     ended.append(run)
             if not ended:
+                if done + len(self._running) < self.runs:
+                    load_ahead()
                 tell(done, [running.step.name for running in self._running.values()])
                 ended = [self._settle(self._running.pop(number)) for number in wait(list(self._running))]  # type: ignore[arg-type]
             for run in ended:

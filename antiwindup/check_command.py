@@ -41,7 +41,8 @@ def check(
     from experiments.checking.words import text
     from identification.base.files import require_writable, write_whole
     from identification.formats.reading import Reading
-    from identification.sweeps.read_sweeps import input_files, read_sweeps
+    from identification.sweeps.input_files import input_files
+    from identification.sweeps.read_sweeps import read_sweeps
 
     inputs = [Path(model), *input_files(sweeps), *([against] if against else [])]
     targets = {path: made for path, made in ((junit, files.junit), (markdown, files.markdown)) if path is not None}

@@ -8,18 +8,27 @@ file belongs to the modules that name it: by its path, or by its name where it l
 from __future__ import annotations
 
 import ast
+import json
+import os
 import platform
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from importlib import metadata
 from pathlib import Path
 
+from identification.base.cache_folders import cache_folders
+from identification.base.errors import InputError
+from identification.base.files import is_file, read_text, write_whole
+
 ROOT = Path(__file__).parents[1]
+IMPORT = "import "
 ROOMS = ("identification", "design", "experiments", "paper_figures")
 CHECKS, FIGURES = "experiments/thesis/claims/checks", "paper_figures/thesis/figures"
 FILE_NAME = re.compile(r"\w[\w./-]*\.\w+")
+_NAME = f"code-files-{sha256(bytes(ROOT)).hexdigest()[:16]}.json"  # what was found in the modules of this copy
 
 
 def code_of(command: Sequence[str]) -> str:
@@ -69,21 +78,29 @@ def files_of(module: str) -> list[str]:
     return [path.as_posix() for path in found if (ROOT / path).is_file()]
 
 
-def needs(node: ast.AST, folder: Path) -> Iterator[str]:
-    """The files that a statement of a module in this folder imports or names."""
+def mentions(node: ast.AST) -> Iterator[str]:
+    """What a statement imports of ours, as ``import a.b``, and what in it may name a file."""
     if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
         return
+    imported: list[str] = []
     if isinstance(node, ast.Import):
-        for alias in node.names:
-            yield from files_of(alias.name)
+        imported = [alias.name for alias in node.names]
     elif isinstance(node, ast.ImportFrom) and node.module:
-        for alias in node.names:
-            yield from files_of(f"{node.module}.{alias.name}")
+        imported = [f"{node.module}.{alias.name}" for alias in node.names]
     elif isinstance(node, ast.Constant) and isinstance(node.value, str) and FILE_NAME.fullmatch(node.value):
-        places = (place / node.value for place in (Path(), folder, Path("data/thesis")))
-        yield from (place.as_posix() for place in places if (ROOT / place).is_file())
+        yield node.value
+    yield from (f"{IMPORT}{name}" for name in imported if name.partition(".")[0] in (*ROOMS, "data"))
     for below in ast.iter_child_nodes(node):
-        yield from needs(below, folder)
+        yield from mentions(below)
+
+
+@cache
+def meant(mention: str, folder: str) -> tuple[str, ...]:
+    """The files that are meant by what a module in a folder mentions."""
+    if mention.startswith(IMPORT):
+        return tuple(files_of(mention.removeprefix(IMPORT)))
+    places = (Path(place, mention) for place in ("", folder, "data/thesis"))
+    return tuple(place.as_posix() for place in places if (ROOT / place).is_file())
 
 
 def command_name(node: ast.AST) -> str | None:
@@ -97,25 +114,57 @@ def command_name(node: ast.AST) -> str | None:
 @cache
 def read(file: str) -> tuple[frozenset[str], dict[str, frozenset[str]]]:
     """What a module needs, and what each of its commands needs besides."""
-    path = ROOT / file
-    if path.suffix != ".py":
+    if not file.endswith(".py"):
         return frozenset(), {}
-    module, commands = set[str](), {}
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
-        found = frozenset(needs(node, Path(file).parent))
-        if name := command_name(node):
-            commands[name] = found
-        else:
-            module |= found
-    return frozenset(module), commands
+    folder, kept = os.path.dirname(file), _kept()  # noqa: PTH120
+    if (found := kept.get(digest(file))) is None:
+        found = kept[digest(file)] = _parsed(file)
+    needs = {
+        name: frozenset(each for mention in said for each in meant(mention, folder)) for name, said in found.items()
+    }
+    return needs.pop(""), needs
+
+
+def _parsed(file: str) -> dict[str, list[str]]:
+    """What each command of a module mentions; with no name, what the rest of the module does."""
+    found: dict[str, list[str]] = {"": []}
+    for node in ast.parse((ROOT / file).read_text(encoding="utf-8")).body:
+        name = command_name(node) or ""
+        found[name] = sorted({*found.get(name, []), *mentions(node)})
+    return found
+
+
+@cache
+def _kept() -> dict[str, dict[str, list[str]]]:
+    """Digest of a module -> what :func:`_parsed` found in it, in this process or in one before."""
+    for folder in cache_folders():
+        with suppress(InputError, ValueError):
+            return dict(json.loads(read_text(folder / _NAME)))
+    return {}
+
+
+def keep() -> None:
+    """Keep for the next build what was found in the modules, where that is possible."""
+    modules = {digest(file) for room in ROOMS for file in _modules(room)}
+    kept = json.dumps({each: found for each, found in _kept().items() if each in modules})
+    for folder in cache_folders():
+        with suppress(InputError, OSError):
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if not is_file(place := folder / _NAME) or read_text(place) != kept:
+                write_whole({place: kept})
+            return
+
+
+@cache
+def digest(file: str) -> str:
+    """The SHA-256 of a file of the project."""
+    return sha256((ROOT / file).read_bytes()).hexdigest()
 
 
 @cache
 def hash_of(files: frozenset[str]) -> str:
     """The hash of the contents of files of the project and of the versions of the packages it runs with."""
-    digests = [platform.python_version()] + [
-        f"{file} {sha256((ROOT / file).read_bytes()).hexdigest()}" for file in sorted(files)
-    ]
+    digests = [platform.python_version(), *(f"{file} {digest(file)}" for file in sorted(files))]
     return sha256("\n".join([*digests, *_packages()]).encode()).hexdigest()
 
 

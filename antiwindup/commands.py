@@ -118,11 +118,7 @@ def _asked(
 ) -> tuple[Asked, dict[str, Any]]:
     """What a build is for, with files that are there; and how it is run."""
     from antiwindup.steps import Asked
-    from antiwindup.worker import prepare
-
-    prepare()
-    from design.asked_model import asked_model
-    from identification.sweeps.read_sweeps import input_files
+    from identification.sweeps.input_files import input_files
 
     if not output or true_path(Path(output)) == Path(true_path(Path(output)).anchor):
         raise InputError(f"--output is {shown(output)}; expected a folder for the outputs alone")
@@ -138,6 +134,8 @@ def _asked(
     for path in asked.sweep_files:
         require_readable(path)
     if model is not None:
+        from design.asked_model import asked_model
+
         asked_model(model)
     return asked, {"jobs": jobs or os.cpu_count() or 1, "force": force}
 
@@ -167,6 +165,7 @@ def _build(asked: Asked, steps: Sequence[Step], wanted: Sequence[Step], goes_on:
     from tqdm import tqdm
 
     from antiwindup.build import Build, Crash
+    from antiwindup.code_files import keep
 
     inputs = (*asked.sweep_files, *(asked.model_files if asked.model else ()), *asked.axis_files)
     build = Build(asked.folder, steps, inputs, wanted, goes_on, jobs, force)
@@ -181,6 +180,7 @@ def _build(asked: Asked, steps: Sequence[Step], wanted: Sequence[Step], goes_on:
             bar.close()
             click.echo(str(crash), err=True)
             sys.exit(1)
+    keep()
     click.echo(build.printed.get("fit", ""), nl=False)
     for name, sentence in build.refused.items():
         click.echo(f"{name} was refused: {sentence}")

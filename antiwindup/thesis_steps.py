@@ -10,9 +10,12 @@ from antiwindup.steps import Asked, Step, campaign_tables, csv_files, fit_steps,
 
 
 def thesis_steps(asked: Asked) -> list[Step]:
-    """What every figure of the thesis, and of ours, is drawn from, for one model; and the figures."""
-    of_thesis = [_tables(asked.folder, "pid"), _tables(asked.folder, "conditions")]
-    return [*fit_steps(asked), *_designs(asked), *of_thesis, *_experiments(asked), *_figures(asked.folder)]
+    """What every figure of the thesis, and of ours, is drawn from, for one model; and the figures.
+
+    Of steps that could begin, the first begins: what takes longest comes first, so that no processor waits at the end.
+    """
+    conditions, figures = _tables(asked.folder, "conditions"), _figures(asked.folder)
+    return [conditions, *fit_steps(asked), *_designs(asked), *_experiments(asked), *figures]
 
 
 def report_steps(asked: Asked, before: Sequence[Step]) -> list[Step]:
@@ -33,8 +36,8 @@ def _designs(asked: Asked) -> list[Step]:
     """With the thesis's references and free parameters; robust has a roll-off, so that W_a guarantees its stability."""
     extended = ("extended", "--reference-omega", "1.5", "--a", "4", "--e", "2", "--f", "1")
     commands = {
-        "delay_free": ("delay-free", "--reference-hz", "0.25", "--epsilon", "1e-4"),
         "extended": extended,
+        "delay_free": ("delay-free", "--reference-hz", "0.25", "--epsilon", "1e-4"),
         "robust": (*extended, "--robust-level", "0.9"),
     }
     designs = {name: asked.folder / f"design_{name}.json" for name in commands}
@@ -55,39 +58,32 @@ def _experiments(asked: Asked) -> list[Step]:
     limit = () if asked.limit is None else ("--limit", str(asked.limit))
     campaign = folder / "results" / "campaign.parquet"
     plants = ("--plants", str(asked.plants), "--seed", "1", *limit, "--anew", "--output", str(campaign))
+    results, (compare, additive) = str(folder / "results"), ("compare", "additive-error")
     return [
-        Step(
-            "additive-error",
-            (
-                "experiments",
-                "thesis",
-                "additive-error",
-                "--output",
-                str(folder / "results"),
-                "--",
-                asked.chosen,
-                *tests,
-            ),
-            csv_files(folder, "additive_error", "additive_error_summary"),
-            (*asked.model_files, *files),
-        ),
-        _tables(folder, "f-gamma", extended),
-        _tables(folder, "chapter-2", delay_free, options=limit, stem="delay_free"),
-        _tables(folder, "chapter-4", extended, options=limit, stem="extended"),
-        _tables(folder, "trade-off", extended),
-        _tables(folder, "interpolation", extended, more=("interpolation_map",)),
-        _tables(folder, "robustness", extended, robust),
-        _tables(folder, "limits", delay_free, stem="limits_delay_free"),
+        Step("campaign", ("experiments", "thesis", "campaign", *plants, "--", str(extended)), (campaign,), (extended,)),
         _tables(folder, "limits", extended, stem="limits_extended"),
+        _tables(folder, "limits", delay_free, stem="limits_delay_free"),
+        _tables(folder, "hidden-modes", extended, options=limit),
         _tables(folder, "sampled-rates", extended, options=limit, stem="sampled"),
+        _tables(folder, "trade-off", extended),
+        _tables(folder, "f-gamma", extended),
         Step(
-            "compare",
-            ("experiments", "thesis", "compare", *limit, "--output", str(folder / "results"), "--", str(extended)),
+            compare,
+            ("experiments", "thesis", compare, *limit, "--output", results, "--", str(extended)),
             csv_files(folder, "compare", "compare_runs"),
             (extended,),
         ),
-        _tables(folder, "hidden-modes", extended, options=limit),
-        Step("campaign", ("experiments", "thesis", "campaign", *plants, "--", str(extended)), (campaign,), (extended,)),
+        _tables(folder, "interpolation", extended, more=("interpolation_map",)),
+        _tables(folder, "chapter-4", extended, options=limit, stem="extended"),
+        _tables(folder, "chapter-2", delay_free, options=limit, stem="delay_free"),
+        _tables(folder, "robustness", extended, robust),
+        _tables(folder, "pid"),
+        Step(
+            additive,
+            ("experiments", "thesis", additive, "--output", results, "--", asked.chosen, *tests),
+            csv_files(folder, "additive_error", "additive_error_summary"),
+            (*asked.model_files, *files),
+        ),
         campaign_tables(folder),
     ]
 

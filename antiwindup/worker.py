@@ -1,4 +1,4 @@
-"""Commands of the rooms, each in a process of its own, forked from one that has the packages loaded already."""
+"""Commands of the rooms, each in a process of its own, which loads what it needs or is forked from one that has it."""
 
 from __future__ import annotations
 
@@ -16,36 +16,30 @@ from identification.base.errors import InputError
 from identification.base.files import keep_journal
 from identification.base.process import begin, leave_signals_to_parent, undisturbed
 
-PACKAGES = [
-    "flint",
-    "jinja2",
-    "matplotlib.backends.backend_pdf",
-    "matplotlib.backends.backend_svg",
-    "matplotlib.figure",
-    "numba",
-    "pandas",
-    "scipy.optimize",
-    "scipy.signal",
-    "scipy.stats",
-    "tqdm",
-]
-"""What takes long to import."""
+_server = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else None
+_is_loading = False
 
 
-def prepare() -> None:
-    """Begin to load the packages, in the process from which the others are forked, while this one does something else.
+def load_ahead() -> None:
+    """Begin to load :mod:`antiwindup.preloaded`, once, in a process that the commands from then on are forked from.
 
     Where that process cannot begin, :func:`start` says why.
     """
-    os.environ["PYTHONSAFEPATH"] = "1"  # the processes import nothing from the folder that they happen to run in
-    if "forkserver" in multiprocessing.get_all_start_methods():
-        multiprocessing.get_context("forkserver").set_forkserver_preload(PACKAGES)
-        with undisturbed, suppress(OSError):
-            ensure_running()
+    global _is_loading
+    if _server is None or _is_loading:
+        return
+    _is_loading = True
+    _import_nothing_from_here()
+    multiprocessing.get_context("forkserver").set_forkserver_preload(["antiwindup.preloaded"])
+    with undisturbed, suppress(OSError):
+        ensure_running()
 
 
 def start(command: Sequence[str], log: Path, journal: Path) -> BaseProcess:
     """Start ``antiwindup COMMAND...``; what it prints goes to a file. When this process ends, so does that one.
+
+    Before :func:`load_ahead` was called it is a process that loads what it needs, which is what a single one takes
+    least time for.
 
     Parameters
     ----------
@@ -61,10 +55,9 @@ def start(command: Sequence[str], log: Path, journal: Path) -> BaseProcess:
     InputError
         No process can be started.
     """
-    prepare()
-    has_server = "forkserver" in multiprocessing.get_all_start_methods()
-    context = multiprocessing.get_context("forkserver") if has_server else multiprocessing.get_context("spawn")
-    process: BaseProcess = context.Process(target=_run, args=(tuple(command), str(log), journal))
+    _import_nothing_from_here()
+    context = multiprocessing.get_context(_server if _is_loading else "spawn")
+    process: BaseProcess = context.Process(target=_run, args=(tuple(command), str(log), journal))  # type: ignore[attr-defined]
     try:
         with undisturbed:
             process.start()
@@ -72,6 +65,11 @@ def start(command: Sequence[str], log: Path, journal: Path) -> BaseProcess:
         wanted = "packages that load in this folder, and the files and the memory that they need"
         raise InputError(f"no process can be started ({error}); expected {wanted}") from None
     return process
+
+
+def _import_nothing_from_here() -> None:
+    """Let the processes to come import nothing from the folder that they happen to run in."""
+    os.environ["PYTHONSAFEPATH"] = "1"
 
 
 def _run(command: Sequence[str], log: str, journal: Path) -> None:

@@ -17,7 +17,15 @@ import click
 
 from experiments.axis_command import axis_command
 from experiments.campaign.command import campaign_command
-from experiments.options import DESIGN, OUTPUT_FOLDER, RATE_LIMIT, asked_limits, reference_options, sinusoid_options
+from experiments.options import (
+    DESIGN,
+    OUTPUT_FOLDER,
+    RATE_LIMIT,
+    SCHEDULER,
+    asked_limits,
+    reference_options,
+    sinusoid_options,
+)
 from experiments.pair_options import NumberPair, PairCommand
 from experiments.run_commands import sampled_command, simulate_command
 from experiments.table_commands import rates_command, tracking_command
@@ -77,10 +85,16 @@ def campaign_distributions(campaign: Path, output: Path) -> None:
     help="Saturation limits in the actuator's unit, LOW < HIGH, or one number for +- that; repeatable.",
 )
 @RATE_LIMIT
+@SCHEDULER
 @sinusoid_options
 @OUTPUT_FOLDER
 def limits(
-    design: Path, limits: tuple[tuple[float, ...], ...], rate_limit: float, output: Path, **reference: Any
+    design: Path,
+    limits: tuple[tuple[float, ...], ...],
+    rate_limit: float,
+    scheduler: str | None,
+    output: Path,
+    **reference: Any,
 ) -> None:
     """What no controller of DESIGN's plant can better: limits_KIND.csv, limits_KIND_summary.csv (the first LIMIT)."""
     from tqdm import tqdm
@@ -93,7 +107,7 @@ def limits(
     with tqdm(desc="limits", unit="", disable=None, leave=False) as bar:
         asked = sinusoids(content, **reference)
         names = ("none", "corrected")
-        write_into(output, limits_tables(content, asked, limits, bar.update, names, rate_limit))
+        write_into(output, limits_tables(content, asked, limits, bar.update, names, rate_limit, scheduler=scheduler))
 
 
 @main.command("compare", cls=PairCommand)

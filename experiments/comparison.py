@@ -17,10 +17,11 @@ from experiments.physical_limits.least_peak_error import RestLimit
 from experiments.runs.compare_anti_windups import SETTLED, anti_windups, is_slewing, run_all
 from experiments.runs.design_loop import design_loop
 from experiments.runs.disturbances import Disturbances, steps
-from experiments.runs.guarantee import guarantee, sector_text
+from experiments.runs.guarantee import guarantee
 from experiments.runs.metrics import of_table, recovery
 from experiments.runs.references import Reference, SampledReference
 from experiments.runs.run_length import required, scale, settled_periods, span
+from experiments.runs.words import sector_text
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 

@@ -58,6 +58,10 @@ RATE_LIMIT = click.option(
     help="Most change of the actuator in a second, in its unit, unknown to the controller.",
 )
 
+SCHEDULER = click.option(
+    "--scheduler", metavar="ADDRESS", help="Compute on the Dask cluster with this scheduler, not here."
+)
+
 disturbance_options = together(
     click.option(
         "--input-disturbance",

@@ -15,6 +15,10 @@ if TYPE_CHECKING:  # a command line need not wait for it
     import pandas as pd
 
 
+FORMAT = "%.12g"
+BLOCK = 4096  # rows
+
+
 def write_tables(tables: Mapping[Path, pd.DataFrame], inputs: Iterable[Path] = ()) -> None:
     """Write tables as CSV, all of them or none, see :func:`csv_writer`."""
     write_whole({path: csv_writer(table) for path, table in tables.items()}, inputs)
@@ -63,4 +67,16 @@ def read_cells(path: Path, columns: Sequence[str]) -> pd.DataFrame:
 
 def csv_writer(table: pd.DataFrame) -> Callable[[Path], object]:
     """What writes a table as CSV with 12 significant digits; NaN is written as an empty cell."""
-    return lambda path: table.to_csv(path, index=False, float_format="%.12g", lineterminator="\n")
+    if len(table.columns) > 1 and all(dtype == "float64" for dtype in table.dtypes):
+        return lambda path: _write_numbers(path, table)
+    return lambda path: table.to_csv(path, index=False, float_format=FORMAT, lineterminator="\n")
+
+
+def _write_numbers(path: Path, table: pd.DataFrame) -> None:
+    """The same file as pandas writes, which calls functions for each cell and takes five times as long."""
+    row = ",".join([FORMAT] * len(table.columns)) + "\n"
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table[:0].to_csv(file, index=False, lineterminator="\n")
+        for first in range(0, len(table), BLOCK):
+            block = table[first : first + BLOCK].to_numpy()
+            file.write((row * len(block) % tuple(block.ravel().tolist())).replace("nan", ""))

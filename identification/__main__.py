@@ -20,7 +20,7 @@ from identification.base.axis_option import AXIS
 from identification.base.command_line import CommandGroup, together
 from identification.base.files import Content, require_writable, write_whole
 from identification.base.path_types import FIGURE_FILE, INPUT, OUTPUT_FILE
-from identification.model.additive_bound import HIGHEST_ORDER
+from identification.bound.orders import HIGHEST_ORDER
 
 
 class Counts(click.ParamType):  # type: ignore[type-arg]  # generic in the newest click only
@@ -195,8 +195,9 @@ def fit(
     from identification.model.signals import Signals
     from identification.model.structure import Wanted
     from identification.output.fit_facts import bound_remarks, bound_text, check_lines, table
+    from identification.sweeps.input_files import input_files
     from identification.sweeps.kept_responses import write_responses
-    from identification.sweeps.read_sweeps import input_files, read_sweeps
+    from identification.sweeps.read_sweeps import read_sweeps
 
     files = input_files(sweeps)
     require_writable(*(path for path in (output, responses, figure) if path is not None), inputs=files)

@@ -11,7 +11,7 @@ import numpy as np
 from identification.base.errors import InputError, shown
 from identification.bound.bound_residuals import bound_residuals
 from identification.fitting.fit_plant import FitResult, fit_plant
-from identification.fitting.other_classes import fits_reversed, has_outliers, refuse_unstable
+from identification.fitting.other_classes import refuse_unstable, reversed_fit, robust_fit
 from identification.fitting.single_test_fit import Misfit, Undetermined
 from identification.fitting.subspace_check import check_modes
 from identification.model.fit_record import FitRecord
@@ -111,27 +111,39 @@ def fit_model(
 
 
 def _fit_either_sign(
-    tests: Sequence[FrequencyResponse], wanted: Wanted, *, soft: bool, seed: int, tick: Tick
+    tests: Sequence[FrequencyResponse],
+    wanted: Wanted,
+    *,
+    soft: bool,
+    seed: int,
+    tick: Tick,
+    known: FitResult | None = None,
 ) -> tuple[Sequence[FrequencyResponse], FitResult, float | None]:
-    """The tests as they were fitted, the fit, and, if their phase is reversed, the misfit before; None if it is not."""
+    """The tests as they were fitted, the fit, and, if their phase is reversed, the misfit before; None if it is not.
+
+    ``known`` is the fit of the tests as they are, if it was made already.
+    """
     result, refusal, distance, stands_out = None, None, np.inf, True
     try:
-        result = fit_plant(tests, wanted, soft=soft, seed=seed, tick=tick)
+        result = known or fit_plant(tests, wanted, soft=soft, seed=seed, tick=tick)
         distance = max(test.distance for test in result.tests)
         stands_out = any(test.worst > BY_CHANCE for test in result.tests)
         if distance < POOR and not stands_out and not any(test.misfit for test in result.tests):
             return tests, result, None
     except (Misfit, Undetermined) as error:
         refusal = error
-    if not soft and (stands_out or distance > POOR) and has_outliers(tests[0], wanted, distance):
-        used, robust, before = _fit_either_sign(tests, wanted, soft=True, seed=seed, tick=tick)
+    is_suspect, is_one = not soft and (stands_out or distance > POOR), len(tests) == 1
+    if is_suspect and (found := robust_fit(tests[0], wanted, distance, seed=seed)):
+        known = found if is_one else None
+        used, robust, before = _fit_either_sign(tests, wanted, soft=True, seed=seed, tick=tick, known=known)
         if before is None:
             return used, robust, None
         # the sign was what least squares missed: with the other one they are tried again
         return used, _fit_either_sign(used, wanted, soft=False, seed=seed, tick=tick)[1], before
-    if fits_reversed(tests, wanted, distance, np.inf if result is None else result.tests[0].deviance, soft=soft):
+    deviance = np.inf if result is None else result.tests[0].deviance
+    if found := reversed_fit(tests, wanted, distance, deviance, soft=soft, seed=seed):
         turned = [conjugated(test) for test in tests]
-        return turned, fit_plant(turned, wanted, soft=soft, seed=seed, tick=tick), distance
+        return turned, found if is_one else fit_plant(turned, wanted, soft=soft, seed=seed, tick=tick), distance
     refuse_unstable(tests[0], None if result is None else result.structure, distance)
     if refusal is not None:
         raise refusal

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
 from functools import cache
 from math import tau
@@ -18,20 +19,42 @@ from design.design_file import Design
 from identification.model.model_file import IdentifiedModel
 
 LONGEST = (
-    "claims/test_ledger.py",  # compiles the engine, while another worker draws
-    "figures/test_data_figures.py",
-    "snapshots/test_figure_data.py",
-    "properties/test_referee.py",
-    "unit/test_unprinted_conditions.py",
+    "claims/test_ledger.py",  # compiles the engine, while another worker fits
     "unit/test_fit.py",
-    "unit/test_closed_loop_accuracy.py",
-    "unit/test_physical_limits.py",
-    "snapshots/test_mutations.py",
+    "unit/test_first_contact.py",
+    "unit/test_campaign.py",
+    "figures/test_data_figures.py",
+    "unit/test_console.py",
+    "hygiene/test_imports.py",
+    "hygiene/test_code_files.py",
+    "unit/test_sweep.py",
     "unit/test_audit.py",
-    "unit/test_anti_windup.py",
+    "unit/test_stable_intervals.py",
+    "properties/test_fit_random_plants.py",
+    "unit/test_unprinted_conditions.py",
     "unit/test_uncertainty.py",
-    "unit/test_pick.py",
+    "snapshots/test_figure_data.py",
+    "unit/test_closed_loop_accuracy.py",
+    "hygiene/test_wheel.py",
+    "unit/test_fuzz.py",
+    "unit/test_certificates.py",
+    "figures/test_report_in_browser.py",
+    "unit/test_robustness.py",
+    "unit/test_anti_windup.py",
+    "unit/test_physical_limits.py",
+    "unit/test_sizes.py",
+    "properties/test_units_of_tables.py",
+    "unit/test_build.py",
 )
+
+
+gc.disable()  # while modules are imported and tests collected: all that is made then stays
+
+
+def pytest_collection_finish() -> None:
+    """What is there now is looked at by no collection of the garbage that tests leave."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -245,7 +245,10 @@ LONG = (
 )
 """Commands that take long whatever their options."""
 
-COSTLY = ("audit", "extended", "delay-free", "chapter-2", "chapter-4", "f-gamma", "interpolation")
+COSTLY = (
+    *("audit", "extended", "delay-free", "anti-windup", "tracking", "chapter-2", "chapter-4"),
+    *("compare", "f-gamma", "interpolation", "robustness"),
+)
 """Those that take more than a tenth of a second."""
 
 RIGHT = {

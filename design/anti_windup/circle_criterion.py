@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from fractions import Fraction
 
 import numpy as np
 
 from design.blocks.block import Block
 from design.blocks.frequency_peak import frequency_grid, refined_maxima
-from design.blocks.positivity import combined, not_positive_at, popov_polynomial, squared_magnitude
+from design.blocks.positivity import exact, not_positive_at, popov_polynomial, squared_magnitude
 from identification.base.arrays import Real
 
 FINE = 200  # frequencies a decade before the peaks are refined
@@ -60,7 +59,7 @@ def circle_sector(
         k = (1 - BELOW) / height
         if perturbation is not None:
             return k
-        missed = not_positive_at(combined(Fraction(k), numerator, Fraction(1), denominator))
+        missed = not_positive_at(exact(k) * numerator + denominator)
         if missed is None:
             return k
         height = max(height * (1 + BELOW), float(least(np.sqrt([missed]))[0]))

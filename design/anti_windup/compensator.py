@@ -35,7 +35,11 @@ class AntiWindup:
 
     def theta2(self, plant: PlantModel) -> Block:
         """theta2 = P (1 + theta1~), Thesis Eq. (2.18), (3.30); for P, (2.11); its dead time is the plant's."""
-        return plant_block(plant) * self.one_plus
+        return self.deviation(plant_block(plant), self.one_plus)
+
+    def deviation(self, plant: Block, one_plus: Block) -> Block:
+        """From u_tilde to y_d, for the plant and 1 + theta1~ in any time, such as their sampled ones."""
+        return plant * one_plus
 
     def to_dict(self) -> dict[str, Any]:
         """Both blocks as design.json holds them."""

@@ -7,22 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
+from flint import fmpq_poly
 
 from design.anti_windup.compensator import AntiWindup
 from design.anti_windup.popov import meets_circle_criterion
 from design.blocks.block import Block
 from design.blocks.frequency_peak import block_norm, frequency_grid, peak, refined_maxima
-from design.blocks.positivity import (
-    Polynomial,
-    combined,
-    multiplied,
-    not_positive_at,
-    popov_polynomial,
-    squared_magnitude,
-)
+from design.blocks.positivity import exact, not_positive_at, popov_polynomial, squared_magnitude
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
 
@@ -178,7 +171,7 @@ def is_positive_real(M: Block) -> bool:
     """
     if not M.is_stable or M.zeros.count(0j) > 1:
         return False
-    return not_positive_at(popov_polynomial(M, 0.0)[M.zeros.count(0j) :]) is None
+    return not_positive_at(popov_polynomial(M, 0.0).right_shift(M.zeros.count(0j))) is None
 
 
 def _is_robust(M: Block, W_a_C_S: Block) -> bool:
@@ -189,21 +182,12 @@ def _is_robust(M: Block, W_a_C_S: Block) -> bool:
     """
     real, modulus = popov_polynomial(M, 0.0), squared_magnitude(M.zeros)
     poles = squared_magnitude(M.poles)
-    above = [Fraction(W_a_C_S.gain) ** 2 * value for value in squared_magnitude(W_a_C_S.zeros)]
+    above = exact(W_a_C_S.gain) ** 2 * squared_magnitude(W_a_C_S.zeros)
     below = squared_magnitude(W_a_C_S.poles)
-    one = Fraction(1)
-    real_squared = multiplied(real, real)
-    left = combined(
-        one,
-        multiplied(real_squared, combined(one, below, one, above)),
-        -one,
-        multiplied(multiplied(modulus, poles), above),
-    )
-    right = multiplied(multiplied(real_squared, real_squared), multiplied(above, below))
-    difference = combined(one, multiplied(left, left), Fraction(-4), right)
+    left = real**2 * (below + above) - modulus * poles * above
+    difference = left**2 - 4 * real**4 * above * below
     return all(not_positive_at(_without_root_at_zero(each)) is None for each in (left, difference))
 
 
-def _without_root_at_zero(polynomial: Polynomial) -> Polynomial:
-    first = next((k for k, value in enumerate(polynomial) if value), 0)
-    return polynomial[first:]
+def _without_root_at_zero(polynomial: fmpq_poly) -> fmpq_poly:
+    return polynomial.right_shift(next((k for k, value in enumerate(polynomial.coeffs()) if value), 0))

@@ -100,7 +100,8 @@ def corrected(
 
     The poles lie on a lattice that hangs on the bandwidth alone, so that a longer recovery only adds to it. f does not
     increase with the recovery time by more than that by which it must be better for another theta1~ to be taken: 1e-6
-    of it and 1e-9 of ||W_a||, where many programs have to be solved more (tenfold for each hundred, 1e-2 at most).
+    of it and 1e-9 of ||W_a||, where many programs have to be solved more (tenfold for each hundred, 1e-2 at most); and
+    than the tolerance of the programs' N + 1 active conditions makes, 1e-9 of ||W_a|| each.
     Every point of a coarse lattice, j a multiple of 16, is solved or excluded by the dual of a program that was solved
     nearby. Between them a point counts if its f is not below 1/OPEN of the lower one of its two coarse neighbours'
     programs; so one whose neighbours are both excluded with that margin cannot win. What is returned is judged again:

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -23,8 +22,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from design.blocks.block import Block
 from design.blocks.positivity import (
-    combined,
-    multiplied,
+    exact,
     not_positive_at,
     popov_polynomial,
     real_polynomial,
@@ -34,8 +32,8 @@ from design.blocks.positivity import (
 from identification.base.arrays import Real
 from identification.base.errors import InputError
 
-SLACK = Fraction(1, 10**4)  # least eigenvalue of -(A'P + P A), at first
-LEAST_SLACK = Fraction(1, 10**11)  # rounding would hide a smaller one
+SLACK = fmpq(1, 10**4)  # least eigenvalue of -(A'P + P A), at first
+LEAST_SLACK = fmpq(1, 10**11)  # rounding would hide a smaller one
 MOVED = 1e-6  # of P, by which it may be moved to be exact
 BITS = 256  # of the roots of the spectral factor
 
@@ -85,21 +83,20 @@ def certificate(M: Block) -> Rows:
     the largest P, so that C P^-1 C' is least.
     """
     rates, at_zero, n = _rates(M), M.zeros.count(0j), len(M.poles)
-    real, size = popov_polynomial(M, 0.0), [Fraction(0)] if at_zero else squared_magnitude(M.poles)
+    real, size = popov_polynomial(M, 0.0), fmpq_poly() if at_zero else squared_magnitude(M.poles)
     for k in range(1, n + 1):
         first, rest = (real_polynomial([complex(-rate) for rate in part]) for part in (rates[:k], rates[k:]))
-        above = combined(Fraction(1), first[:1], Fraction(-at_zero), first)
-        size = combined(Fraction(1), size, Fraction(1), squared_on_axis(multiplied(above, rest)))
+        size += squared_on_axis((first[0] - at_zero * first) * rest)
     slack = SLACK
-    while at_zero > 1 or not_positive_at(factored := combined(Fraction(2), real, -slack, size)[at_zero:]) is not None:
+    while at_zero > 1 or not_positive_at(factored := (2 * real - slack * size).right_shift(at_zero)) is not None:
         slack /= 10
         if slack < LEAST_SLACK:
             raise InputError(f"1 + theta1~ with the zeros {M.zeros} is not positive real; expected Re M > 0")
     with ctx.workprec(BITS):
-        found: Any = fmpq_poly([_exact(value) for value in factored]).complex_roots()
+        found: Any = factored.complex_roots()
         roots = [complex((-root).sqrt()) for root, multiplicity in found for _ in range(multiplicity)]
-    g = np.atleast_1d(np.real(np.poly([*roots, *(0.0,) * at_zero]))) * np.sqrt(float(factored[-1]))
-    row = _floats(_along_chain([Fraction(value) for value in g[::-1]], rates)[1])
+    g = np.atleast_1d(np.real(np.poly([*roots, *(0.0,) * at_zero]))) * np.sqrt(float(factored[factored.degree()]))
+    row = _floats(_along_chain(fmpq_poly([exact(value) for value in g[::-1]]), rates)[1])
     A = _floats(_chain(rates)[0])
     P = solve_continuous_lyapunov(A.T, -row.T @ row - float(slack) * np.eye(n)) if n else np.zeros((0, 0))
     rows = tuple(tuple(each) for each in ((P + P.T) / 2).tolist())
@@ -126,7 +123,7 @@ def proved_storage(M: Block, rows: Rows) -> Storage:
     rates, n, at_zero = _rates(M), len(M.poles), M.zeros.count(0j)
     if len(rows) != n or any(len(row) != n for row in rows) or rows != tuple(zip(*rows, strict=True)):
         raise InputError(f"the certificate of the anti-windup is no symmetric matrix; expected one with {n} rows")
-    P = fmpq_mat(n, n, [_exact(Fraction(value)) for row in rows for value in row])
+    P = fmpq_mat(n, n, [exact(value) for row in rows for value in row])
     at_infinity, C = _along_chain(real_polynomial(M.zeros), rates)
     A, b = _chain(rates)
     if n and at_zero:
@@ -145,46 +142,41 @@ def proved_storage(M: Block, rows: Rows) -> Storage:
     return Storage(_floats(A), _floats(b)[:, 0], _floats(C)[0], _floats(P))
 
 
-def _rates(M: Block) -> list[Fraction]:
+def _rates(M: Block) -> list[fmpq]:
     """The p_k, exactly."""
     if any(pole.imag or pole.real >= 0 for pole in M.poles) or len(M.zeros) != len(M.poles):
         raise InputError(
             "1 + theta1~ has complex or unstable poles, or another number of zeros; a certificate has none"
         )
-    return sorted((Fraction(-pole.real) for pole in M.poles), reverse=True)
+    return sorted((exact(-pole.real) for pole in M.poles), reverse=True)
 
 
-def _chain(rates: Sequence[Fraction]) -> tuple[fmpq_mat, fmpq_mat]:
+def _chain(rates: Sequence[fmpq]) -> tuple[fmpq_mat, fmpq_mat]:
     """A and b of the chain."""
     n = len(rates)
     A = fmpq_mat(n, n)
     for k, rate in enumerate(rates):
-        A[k, k] = -_exact(rate)
+        A[k, k] = -rate
         if k:
-            A[k, k - 1] = _exact(rate)
-    return A, fmpq_mat(n, 1, [_exact(rate) if k == 0 else 0 for k, rate in enumerate(rates)])
+            A[k, k - 1] = rate
+    return A, fmpq_mat(n, 1, [rate if k == 0 else 0 for k, rate in enumerate(rates)])
 
 
-def _along_chain(numerator: Sequence[Fraction], rates: Sequence[Fraction]) -> tuple[Fraction, fmpq_mat]:
+def _along_chain(numerator: fmpq_poly, rates: Sequence[fmpq]) -> tuple[fmpq, fmpq_mat]:
     """A numerator of degree n over the denominator: its value at infinity, and its row over the chain's states.
 
     The numerator is divided by s + p_n, what comes out by s + p_(n-1), and so on: the remainders are those of
     prod_(i > k) (s + p_i), so that they belong to x_k but for prod_(i <= k) p_i.
     """
-    left, remainders = list(numerator), []
+    remainders: list[fmpq] = []
     for rate in reversed(rates):
-        value, quotient = Fraction(0), []
-        for coefficient in reversed(left):
-            value = coefficient - rate * value
-            quotient.append(value)
-        remainders.append(value)
-        left = quotient[-2::-1]
-    row = []
-    gain = Fraction(1)
+        numerator, rest = divmod(numerator, fmpq_poly([rate, 1]))
+        remainders.append(rest[0])
+    row, gain = [], fmpq(1)
     for rate, remainder in zip(rates, reversed(remainders), strict=True):
         gain *= rate
-        row.append(_exact(remainder / gain))
-    return left[0], fmpq_mat(1, len(row), row)
+        row.append(remainder / gain)
+    return numerator[0], fmpq_mat(1, len(row), row)
 
 
 def _bordered(matrix: fmpq_mat, column: fmpq_mat) -> fmpq_mat:
@@ -203,7 +195,3 @@ def _is_definite(matrix: fmpq_mat) -> bool:
 
 def _floats(matrix: fmpq_mat) -> Real:
     return np.array([int(value.p) / int(value.q) for value in matrix.entries()]).reshape(matrix.nrows(), matrix.ncols())
-
-
-def _exact(value: Fraction) -> fmpq:
-    return fmpq(value.numerator, value.denominator)

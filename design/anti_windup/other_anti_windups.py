@@ -25,7 +25,6 @@ from design.anti_windup.least_gain import static, weston_postlethwaite
 from design.anti_windup.linear_loop import LinearLoop
 from design.blocks.block import Block, from_polynomial, plant_block
 from identification.base.errors import InputError
-from identification.model.plant import PlantModel
 
 AROUND_ZERO = 1e-2  # of the slowest root: the circle in which zeros at s = 0 are counted
 ON_CIRCLE = 400  # points
@@ -34,7 +33,7 @@ ON_CIRCLE = 400  # points
 class BackCalculation(AntiWindup):
     """u = v - B u~ with B = one_plus - 1, and no theta2: the loop sees y alone."""
 
-    def theta2(self, plant: PlantModel) -> Block:
+    def deviation(self, plant: Block, one_plus: Block) -> Block:
         """Zero."""
         return Block(0.0)
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from fractions import Fraction
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from design.blocks.block import Block
 from design.blocks.frequency_peak import frequency_grid, refined_maxima
-from design.blocks.positivity import combined, not_positive_at, popov_polynomial, squared_magnitude
+from design.blocks.positivity import exact, not_positive_at, popov_polynomial, squared_magnitude
 from identification.base.arrays import Real
 
 PER_DECADE = 200  # frequencies of the search
@@ -55,7 +54,7 @@ def popov_sector(theta1_tilde: Block) -> tuple[float, float]:
     numerator = popov_polynomial(theta1_tilde, multiplier)
     while True:
         k = float(-(1 - BELOW) / height)
-        missed = not_positive_at(combined(Fraction(k), numerator, Fraction(1), denominator))
+        missed = not_positive_at(exact(k) * numerator + denominator)
         if missed is None:
             return k, multiplier
         search.add(np.sqrt(missed) * np.linspace(1 - 1e-3, 1 + 1e-3, 101))
@@ -65,7 +64,7 @@ def popov_sector(theta1_tilde: Block) -> tuple[float, float]:
 def meets_circle_criterion(theta1_tilde: Block, sector: float) -> bool:
     """Whether Re theta1~(j omega) + 1/k > 0 for all omega and a sector k, in exact arithmetic; see popov_sector."""
     numerator, denominator = popov_polynomial(theta1_tilde, 0.0), squared_magnitude(theta1_tilde.poles)
-    return not_positive_at(combined(Fraction(sector), numerator, Fraction(1), denominator)) is None
+    return not_positive_at(exact(sector) * numerator + denominator) is None
 
 
 def robust_popov_sector(

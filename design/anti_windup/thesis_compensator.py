@@ -12,6 +12,9 @@ from design.blocks.block import bound_block
 from design.blocks.frequency_peak import frequency_grid, searched_norm
 from identification.model.additive_bound import AdditiveBound
 
+MOST = 50  # parabolas; some five are enough
+EXCHANGED = 1e-9  # by which the square of the least f exceeds its lower bound, relative
+
 
 def optimal_gamma(bound: AdditiveBound, alpha: float, beta: float) -> tuple[float, float]:
     """The gamma that minimises f(gamma) for given alpha and beta, to about 1e-8, and f there.
@@ -41,6 +44,38 @@ def _minimise(cost: Callable[[float], float], upper: float, tolerance: float) ->
         if found.x < 0.9 * upper:
             return float(found.x), float(found.fun)
         upper *= 4
+
+
+def _exchanged(highest: Callable[[float], tuple[complex, complex]], gamma: float) -> tuple[float, float]:
+    """The gamma >= -1 of the least largest |w + gamma v| over omega, and that; ``highest`` gives w and v where it lies.
+
+    Each |w + gamma v|^2 is a parabola in gamma, below which no largest one falls. Where the highest of those known is
+    lowest the next is asked for, until it is no higher or there are :data:`MOST`; ``gamma`` is the first.
+    """
+    squares, best, least = np.empty((0, 3)), gamma, np.inf
+    for _ in range(MOST):
+        w, v = highest(gamma)
+        if abs(w + gamma * v) < least:
+            best, least = gamma, abs(w + gamma * v)
+        squares = np.vstack([squares, [abs(v) ** 2, 2 * (w * v.conjugate()).real, abs(w) ** 2]])
+        gamma, below = _lowest(squares)
+        if least**2 <= below * (1 + EXCHANGED):
+            break
+    return best, least
+
+
+def _lowest(squares: np.ndarray) -> tuple[float, float]:
+    """Where, at -1 or above, the highest of parabolas is lowest, and how high it is; coefficients of shape (n, 3)."""
+    i, j = np.triu_indices(len(squares), 1)
+    slopes = np.column_stack([np.zeros(len(squares)), 2 * squares[:, 0], squares[:, 1]])
+    a, b, c = np.vstack([squares[i] - squares[j], slopes]).T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        q = -(b + np.copysign(np.sqrt(b**2 - 4 * a * c), b)) / 2
+        roots = np.concatenate([[-1.0], q / a, c / q])
+    gammas = roots[np.isfinite(roots) & (roots >= -1)]
+    heights = (squares[:, :1] * gammas**2 + squares[:, 1:2] * gammas + squares[:, 2:]).max(axis=0)
+    k = int(np.argmin(heights))
+    return float(gammas[k]), float(heights[k])
 
 
 def thesis_choice(bound: AdditiveBound) -> tuple[float, float, float]:
@@ -91,18 +126,28 @@ def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float
     s, values = 1j * omega, W_a(1j * omega)
     ends = 1 / bandwidth, max(100 / bound.resonance.omega, 100 / bandwidth)
 
-    def on_grid(alpha: float, beta: float, tolerance: float) -> float:
-        slope = values / ((1 + alpha * s) * (1 + beta * s))
-        first = _first_gamma(bound, alpha, beta)
-        return _minimise(lambda gamma: float(np.abs(values + gamma * slope).max()), first, tolerance)[1]
+    def on_grid(alpha: float, beta: float) -> float:
+        slopes = values / ((1 + alpha * s) * (1 + beta * s))
+
+        def highest(gamma: float) -> tuple[complex, complex]:
+            k = int(np.argmax(np.abs(values + gamma * slopes)))
+            return complex(values[k]), complex(slopes[k])
+
+        return _exchanged(highest, _first_gamma(bound, alpha, beta) / 4)[1]
 
     def rough(logarithms: np.ndarray) -> float:
         alpha, beta = np.exp(logarithms)
-        return on_grid(float(alpha), float(beta), 1e-6)
+        return on_grid(float(alpha), float(beta))
 
-    def located(logarithms: np.ndarray) -> float:
-        alpha, beta = np.exp(logarithms)
-        return optimal_gamma(bound, float(alpha), float(beta))[1]
+    def located(alpha: float, beta: float) -> tuple[float, float]:
+        def highest(gamma: float) -> tuple[complex, complex]:
+            _, at = searched_norm(W_a * second_order(alpha, beta, gamma).one_plus)
+            if not np.isfinite(at):
+                return complex(W_a.gain), 0j
+            value = complex(W_a(1j * at))
+            return value, value / ((1 + 1j * alpha * at) * (1 + 1j * beta * at))
+
+        return _exchanged(highest, _first_gamma(bound, alpha, beta) / 4)
 
     def polish(cost: Callable[[np.ndarray], float], start: np.ndarray, size: float, most: int) -> np.ndarray:
         limits = [(float(np.log(ends[0])), float(np.log(ends[1])))] * 2
@@ -116,16 +161,14 @@ def least_f(bound: AdditiveBound, bandwidth: float) -> tuple[float, float, float
             start,
             method="Nelder-Mead",
             bounds=limits,
-            options={"maxfev": most, "initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-9},
+            options={"maxfev": most, "initial_simplex": simplex, "xatol": 1e-7, "fatol": 1e-10},
         )
         return np.asarray(found.x)
 
     constants = np.geomspace(*ends, 16)
-    starts = sorted(
-        (on_grid(alpha, beta, 1e-3), alpha, beta) for alpha in constants for beta in constants if beta <= alpha
-    )
+    starts = sorted((on_grid(alpha, beta), alpha, beta) for alpha in constants for beta in constants if beta <= alpha)
     found = [polish(rough, np.log(start[1:]), -0.1, 200) for start in starts[:2]]
-    best = polish(located, min(found, key=rough), -0.002, 40)
+    best = polish(lambda logarithms: located(*np.exp(logarithms))[1], min(found, key=rough), -0.002, 100)
     beta, alpha = sorted(float(constant) for constant in np.exp(best))
-    gamma, f = optimal_gamma(bound, alpha, beta)
-    return alpha, beta, gamma, f
+    gamma, _ = located(alpha, beta)
+    return alpha, beta, gamma, uncertainty_cost(bound, second_order(alpha, beta, gamma).one_plus)[0]

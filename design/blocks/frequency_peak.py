@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from fractions import Fraction
 
 import numpy as np
 
 from design.blocks.block import Block
-from design.blocks.positivity import combined, not_positive_at, squared_magnitude
+from design.blocks.positivity import exact, not_positive_at, squared_magnitude
 from identification.base.arrays import Real
 from identification.base.errors import InputError
 
 REFINED = 1e-8  # of the distance between a maximum's neighbours on the grid: the height is then off by its square
 POINTS = 21  # that divide an interval around a maximum
+DISTANCES = np.geomspace(1e-2, 1e3, 101)  # of the points around a resonance, in half widths
 CERTIFIED = 1e-9  # by which a norm may exceed the value found, relative
 
 
@@ -39,10 +39,9 @@ def frequency_grid(roots: Iterable[complex], per_decade: int = 60) -> Real:
         return np.geomspace(1e-3, 1e3, 6 * per_decade + 1)
     slowest, fastest = np.abs(found).min() * 1e-3, np.abs(found).max() * 1e3
     points = [np.geomspace(slowest, fastest, int(per_decade * np.log10(fastest / slowest)) + 1)]
-    distances = np.geomspace(1e-2, 1e3, 101)
     for root in found[found.imag > 0]:
         width = max(-root.real, root.real, 1e-6 * abs(root))
-        points += [np.array([root.imag]), root.imag + width * distances, root.imag - width * distances]
+        points += [np.array([root.imag]), root.imag + width * DISTANCES, root.imag - width * DISTANCES]
     grid = np.unique(np.concatenate(points))
     undamped = found[found.real == 0].imag
     return np.asarray(grid[(grid >= slowest) & (grid <= fastest) & ~np.isin(grid, undamped)])
@@ -157,8 +156,8 @@ def block_norm(block: Block) -> tuple[float, float]:
     magnitude = _magnitude(block)
     numerator, denominator = squared_magnitude(block.zeros), squared_magnitude(block.poles)
     while True:
-        above = (Fraction(value) * (1 + Fraction(CERTIFIED))) ** 2
-        at = not_positive_at(combined(above, denominator, -(Fraction(block.gain) ** 2), numerator))
+        above = (exact(value) * (1 + exact(CERTIFIED))) ** 2
+        at = not_positive_at(above * denominator - exact(block.gain) ** 2 * numerator, omega**2)
         if at is None:
             return value, omega
         near = math.sqrt(at) * np.linspace(1 - 1e-3, 1 + 1e-3, POINTS)

@@ -1,25 +1,33 @@
-"""Whether a polynomial with real coefficients is positive for every x >= 0: decided in exact integer arithmetic."""
+"""Whether a polynomial with rational coefficients is positive for every x >= 0: decided in exact arithmetic."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from fractions import Fraction
 from itertools import pairwise
+
+from flint import fmpq, fmpq_poly
 
 from design.blocks.block import Block
 
-Polynomial = list[Fraction]  # coefficients, lowest power first
+CLOSE = 2.0**-16  # relative distance from a place where p almost vanishes
 NARROW = 2.0**-50  # relative width of an interval of x that is not divided further
 
 
-def not_positive_at(polynomial: Sequence[Fraction]) -> float | None:
+def exact(value: float) -> fmpq:
+    """The rational number that a float is."""
+    return fmpq(*value.as_integer_ratio())
+
+
+def not_positive_at(p: fmpq_poly, near: float = 0.0) -> float | None:
     """None if p(x) > 0 for every x >= 0 and p does not fall below 0 as x grows; else an x where that was not shown.
 
     Parameters
     ----------
-    polynomial
-        Coefficients of p, lowest power first.
+    p
+        A polynomial in x.
+    near
+        An x around which p almost vanishes, if one is known: the proof is then shorter.
 
     Returns
     -------
@@ -31,88 +39,74 @@ def not_positive_at(polynomial: Sequence[Fraction]) -> float | None:
     -----
     Descartes' rule of signs on intervals of x, divided until it decides (Vincent's theorem; Collins and Akritas,
     SYMSAC 1976): (1 + y)^n p(a + (b - a)/(1 + y)) without a change of sign in its coefficients has no root y > 0, and p
-    none between a and b. Every number is an integer here, so that nothing is rounded.
+    none between a and b. Every number is a fraction of integers here, so that nothing is rounded.
     """
-    common = math.lcm(*(value.denominator for value in polynomial))
-    p = [value.numerator * (common // value.denominator) for value in polynomial]
-    while len(p) > 1 and p[-1] == 0:
-        p.pop()
+    degree = p.degree()
     if p[0] <= 0:
         return 0.0
-    if p[-1] <= 0:
+    if p[degree] <= 0:
         return math.inf
-    if len(p) == 1:
+    if degree == 0:
         return None
-    middle = 2.0 ** round((p[0].bit_length() - p[-1].bit_length()) / (len(p) - 1))
-    if _value(p, middle) <= 0:
-        return middle
-    waiting = [(0.0, middle), (middle, math.inf)]
+    known = [near * (1 - CLOSE), near * (1 + CLOSE)]
+    if not 0 < near < math.inf:
+        known = [2.0 ** round((_bits(p[0]) - _bits(p[degree])) / degree)]
+    for x in known:
+        if p(exact(x)) <= 0:
+            return x
+    waiting = list(pairwise([0.0, *known, math.inf]))
     while waiting:
         low, high = waiting.pop()
         if not _may_vanish(p, low, high):
             continue
         middle = _between(low, high)
-        if _value(p, middle) <= 0 or high < low * (1 + NARROW):
+        if p(exact(middle)) <= 0 or high < low * (1 + NARROW):
             return middle
         waiting += [(low, middle), (middle, high)]
     return None
 
 
-def squared_magnitude(roots: Sequence[complex]) -> Polynomial:
+def squared_magnitude(roots: Sequence[complex]) -> fmpq_poly:
     """prod |j omega - root|^2 as a polynomial in x = omega^2; the roots in conjugate pairs, as a block has them."""
     return squared_on_axis(real_polynomial(roots))
 
 
-def squared_on_axis(polynomial: Sequence[Fraction]) -> Polynomial:
+def squared_on_axis(polynomial: fmpq_poly) -> fmpq_poly:
     """|p(j omega)|^2 as a polynomial in x = omega^2."""
-    return _on_axis(multiplied(polynomial, _reflected(polynomial)))
+    return _on_axis(polynomial * _reflected(polynomial))
 
 
-def real_polynomial(roots: Sequence[complex]) -> Polynomial:
+def real_polynomial(roots: Sequence[complex]) -> fmpq_poly:
     """prod (s - root) as a polynomial in s; the roots in conjugate pairs, as a block has them."""
-    product = [Fraction(1)]
+    product = fmpq_poly([1])
     for root in roots:
-        a, b = Fraction(root.real), Fraction(root.imag)
+        a, b = exact(root.real), exact(root.imag)
         if b == 0:
-            product = multiplied(product, [-a, Fraction(1)])
+            product *= fmpq_poly([-a, 1])
         elif b > 0:
-            product = multiplied(product, [a * a + b * b, -2 * a, Fraction(1)])
+            product *= fmpq_poly([a * a + b * b, -2 * a, 1])
     return product
 
 
-def popov_polynomial(block: Block, multiplier: float) -> Polynomial:
+def popov_polynomial(block: Block, multiplier: float) -> fmpq_poly:
     """Re (1 + j m omega) block(j omega) times |denominator|^2, as a polynomial in x = omega^2."""
-    product = multiplied(real_polynomial(block.zeros), _reflected(real_polynomial(block.poles)))
-    gain = Fraction(block.gain)
-    return [gain * value for value in _on_axis(multiplied(product, [Fraction(1), Fraction(multiplier)]))]
+    product = real_polynomial(block.zeros) * _reflected(real_polynomial(block.poles))
+    return exact(block.gain) * _on_axis(product * fmpq_poly([1, exact(multiplier)]))
 
 
-def _reflected(polynomial: Sequence[Fraction]) -> Polynomial:
+def _reflected(polynomial: fmpq_poly) -> fmpq_poly:
     """p(-s)."""
-    return [value if k % 2 == 0 else -value for k, value in enumerate(polynomial)]
+    return polynomial(fmpq_poly([0, -1]))
 
 
-def _on_axis(polynomial: Polynomial) -> Polynomial:
+def _on_axis(polynomial: fmpq_poly) -> fmpq_poly:
     """The real part of p(j omega) as a polynomial in x = omega^2."""
-    return [value * (-1) ** k for k, value in enumerate(polynomial[::2])]
+    return fmpq_poly([value * (-1) ** k for k, value in enumerate(polynomial.coeffs()[::2])])
 
 
-def multiplied(left: Sequence[Fraction], right: Sequence[Fraction]) -> Polynomial:
-    """The product of two polynomials."""
-    product = [Fraction(0)] * (len(left) + len(right) - 1)
-    for i, a in enumerate(left):
-        for j, b in enumerate(right):
-            product[i + j] += a * b
-    return product
-
-
-def combined(a: Fraction, left: Sequence[Fraction], b: Fraction, right: Sequence[Fraction]) -> Polynomial:
-    """a left + b right."""
-    total = [Fraction(0)] * max(len(left), len(right))
-    for factor, polynomial in ((a, left), (b, right)):
-        for k, value in enumerate(polynomial):
-            total[k] += factor * value
-    return total
+def _bits(value: fmpq) -> int:
+    """The power of two near a positive number."""
+    return int(value.p).bit_length() - int(value.q).bit_length()
 
 
 def _between(low: float, high: float) -> float:
@@ -127,38 +121,12 @@ def _between(low: float, high: float) -> float:
     return math.ldexp(round(math.ldexp(mantissa, digits)), exponent - digits)
 
 
-def _value(p: Sequence[int], x: float) -> int:
-    """The sign of p(x), as an integer that has it."""
-    above, below = x.as_integer_ratio()
-    total, power = 0, 1
-    for value in reversed(p):
-        total = total * above + value * power
-        power *= below
-    return total
-
-
-def _may_vanish(p: Sequence[int], low: float, high: float) -> bool:
-    """Whether Descartes' rule leaves room for a root between two numbers."""
-    above, below = low.as_integer_ratio()
-    n = len(p) - 1
-    # below^n p((above + x)/below): the interval is x > 0, or 0 < x < width
-    shifted = _shifted([value * below ** (n - k) for k, value in enumerate(p)], above)
-    if high < math.inf:
-        above, below = (Fraction(high) - Fraction(low)).as_integer_ratio()
-        below_x = Fraction(low).denominator
-        above *= below_x
-        # x = width/(1 + y)
-        shifted = [value * above**k * below ** (n - k) for k, value in enumerate(shifted)]
-        shifted = _shifted(shifted[::-1], 1)
-    signs = [value > 0 for value in shifted if value]
+def _may_vanish(p: fmpq_poly, low: float, high: float) -> bool:
+    """Whether Descartes' rule leaves room for a root between two numbers, at which p is positive."""
+    if high == math.inf:
+        shifted = p(fmpq_poly([exact(low), 1]))
+    else:
+        scaled = p(fmpq_poly([exact(low), exact(high) - exact(low)]))  # 0 < x < 1, and x = 1/(1 + y)
+        shifted = fmpq_poly(scaled.coeffs()[::-1])(fmpq_poly([1, 1]))
+    signs = [value > 0 for value in shifted.numer().coeffs() if value]
     return any(one != other for one, other in pairwise(signs))
-
-
-def _shifted(p: list[int], by: int) -> list[int]:
-    """The coefficients of p(x + by)."""
-    shifted = list(p)
-    if by:
-        for first in range(len(p) - 1):
-            for k in range(len(p) - 2, first - 1, -1):
-                shifted[k] += by * shifted[k + 1]
-    return shifted

@@ -66,10 +66,15 @@ def conditions(omegas: Sequence[float], delay_s: float, a: float) -> Conditions:
         )
     require_each_once(omegas)
     positive = tuple(float(omega) for omega in sorted(omegas) if omega > 0)
-    s = 1j * np.array(positive)
-    delayed = np.exp(-s * delay_s)
-    at_omegas = (s + a - a * delayed) * (s + a) / (s * delayed)
+    at_omegas = wanted_at(np.array(positive), delay_s, a)
     return Conditions(a, delay_s, positive, a * (1 + a * delay_s), tuple(complex(value) for value in at_omegas))
+
+
+def wanted_at(omega: np.ndarray, delay_s: float, a: float | np.ndarray) -> np.ndarray:
+    """What Q(j omega) must be at positive frequencies in rad/s, Thesis Eq. (4.4); shape (n,)."""
+    s = 1j * omega
+    delayed = np.exp(-s * delay_s)
+    return np.asarray((s + a - a * delayed) * (s + a) / (s * delayed))
 
 
 def require_each_once(omegas: Sequence[float]) -> None:

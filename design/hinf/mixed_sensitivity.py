@@ -125,7 +125,7 @@ def mixed_sensitivity(G: Block, W1: Block, W2: Block, decay_rate: float) -> tupl
     Whether a gamma is feasible is decided as :class:`design.hinf.pick.Problem` says.
     """
     problem = Problem(G, W1, W2, decay_rate)
-    K, bound = _synthesise(problem, SUBOPTIMALITY)
+    K, bound = synthesise(problem)
     return K, _assess(problem, K, bound)
 
 
@@ -189,7 +189,7 @@ def infimum(G: Block, W1: Block, W2: Block, decay_rate: float) -> Infimum:
     reached = decay_rate if on_axis else 0.0
 
     def upper(decay_rate: float) -> float:
-        return closed_loop_norm(G, W1, W2, _synthesise(Problem(G, W1, W2, decay_rate), SUBOPTIMALITY / 10)[0])
+        return closed_loop_norm(G, W1, W2, synthesise(Problem(G, W1, W2, decay_rate), SUBOPTIMALITY / 10)[0])
 
     best, bound = upper(reached), _bisect(Problem(G, W1, W2, 0.0))
     while on_axis and best > (1 + TIGHT) * bound.gamma:
@@ -201,8 +201,8 @@ def infimum(G: Block, W1: Block, W2: Block, decay_rate: float) -> Infimum:
     return Infimum(bound.gamma, bound.reason, best, reached)
 
 
-def _synthesise(problem: Problem, suboptimality: float) -> tuple[Block, Obstacle]:
-    """The controller, with its own check, and what is proved infeasible on the line."""
+def synthesise(problem: Problem, suboptimality: float = SUBOPTIMALITY) -> tuple[Block, Obstacle]:
+    """The controller K of :func:`mixed_sensitivity`, with its own check, and what is proved infeasible on the line."""
     G, decay_rate = problem.G, problem.decay_rate
     _check(problem)
     bound = _bisect(problem)

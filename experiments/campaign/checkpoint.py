@@ -15,17 +15,20 @@ from typing import Any
 
 import click
 
-from experiments.campaign.run_plants import CHUNK, Campaign, Columns
+from experiments.campaign.run_plants import Campaign, Chunk, Columns
 from experiments.campaign.seal import SEAL, Seal
+from experiments.runs.code_hash import DISTRIBUTION, code_sha256
 from identification.base.errors import InputError
 from identification.base.files import read_bytes, read_text, require_writable, write_whole
 
 MANIFEST = "manifest.json"
 PARTIAL = ".partial-"  # of a command that was killed while it wrote
 PART = re.compile(r"part-(\d+)-[0-9a-f]{64}\.parquet")
-PARTS_A_GROUP = 80  # of the file's row groups: 6000 rows
+CHUNK, MOST_CHUNK = 25, 250  # plants that one task runs and a part holds
+MOST_PARTS = 4000  # of a campaign whose chunks may grow: each costs a scheduler and a disk their time
+PLANTS_A_GROUP = 2000  # of the file's rows
 SYNTHETIC = "plants drawn at random inside W_a, not measured"
-PACKAGES = ("antiwindup-thesis", "numpy", "scipy", "numba", "pyarrow")
+PACKAGES = (DISTRIBUTION, "numpy", "scipy", "numba", "pyarrow")
 TOLD = ("synthetic", "kind", "design_sha256", "seed", "plants", "lower_limit", "limit", "rate_limit", "horizon_s")
 """What the file's metadata say."""
 TEXTS, WHOLE, FLAGS = ("anti_windup",), ("plant", "events"), ("linear_stable", "diverged", "covered")
@@ -62,7 +65,7 @@ class CampaignFile:
 
     def __init__(self, output: Path, campaign: Campaign, plants: int, source: Path, anew: bool = False) -> None:
         self.output, self.folder = output, output.with_name(f"{output.name}.parts")
-        self._plants = plants
+        self._plants, self._chunk = plants, min(max(plants // MOST_PARTS, CHUNK), MOST_CHUNK)
         self._facts = {
             "synthetic": SYNTHETIC,
             "kind": campaign.design.kind,
@@ -74,14 +77,14 @@ class CampaignFile:
             "limit": campaign.limits[1],
             "rate_limit": campaign.rate_limit,
             "horizon_s": campaign.horizon_s,
-            "chunk": CHUNK,
-            "code_sha256": campaign.code_sha256,
+            "chunk": self._chunk,
+            "code_sha256": code_sha256(),
             "versions": {name: version(name) for name in PACKAGES},
         }
         self._manifest = json.dumps(self._facts, indent=2) + "\n"
         self._metadata = {name: str(self._facts[name]) for name in TOLD} | {
             "design": source.name,
-            "version": str(version(PACKAGES[0])),
+            "version": version(DISTRIBUTION),
         }
         require_writable(output, inputs=[source])
         self._parts: dict[int, Path] = {}
@@ -90,12 +93,13 @@ class CampaignFile:
             self._parts = self._parts_of(self._manifest)
 
     @property
-    def missing(self) -> list[tuple[int, int]]:
+    def missing(self) -> list[Chunk]:
         """The chunks of which there is no part that is whole, see :func:`experiments.campaign.run_plants.run_chunk`."""
-        firsts = (first for first in range(0, self._plants, CHUNK) if first // CHUNK not in self._parts)
-        return [(first, min(first + CHUNK, self._plants)) for first in firsts]
+        firsts = range(0, self._plants, self._chunk)
+        chunks = [(first, min(first + self._chunk, self._plants)) for first in firsts]
+        return [chunk for number, chunk in enumerate(chunks) if number not in self._parts]
 
-    def keep(self, chunk: tuple[int, int], columns: Columns) -> None:
+    def keep(self, chunk: Chunk, columns: Columns) -> None:
         """Write the part of one chunk."""
         from pyarrow import parquet
 
@@ -103,13 +107,13 @@ class CampaignFile:
             self._begin()
         buffer = BytesIO()
         parquet.write_table(_table(columns), buffer)
-        content, number = buffer.getvalue(), chunk[0] // CHUNK
+        content, number = buffer.getvalue(), chunk[0] // self._chunk
         part = self.folder / _name(number, self._manifest, content)
         write_whole({part: content})
         self._parts[number] = part
 
     def finish(self) -> None:
-        """Put all parts into the file, in the order of the plants, PARTS_A_GROUP at a time, and remove them."""
+        """Put all parts into the file, in the order of the plants, a group of rows at a time, and remove them."""
         write_whole({self.output: self._join})
         for path in [*self._parts.values(), self.folder / MANIFEST]:
             path.unlink(missing_ok=True)
@@ -123,8 +127,8 @@ class CampaignFile:
         import pyarrow
         from pyarrow import parquet
 
-        numbers = range(len(self._parts))
-        groups = [numbers[first : first + PARTS_A_GROUP] for first in numbers[::PARTS_A_GROUP]]
+        numbers, at_once = range(len(self._parts)), max(PLANTS_A_GROUP // self._chunk, 1)
+        groups = [numbers[first : first + at_once] for first in numbers[::at_once]]
         schema = self._read(0).schema.with_metadata(self._metadata)
         seal = Seal(schema)
         for group in groups:

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from experiments.options import DESIGN, LIMIT_PAIR, RATE_LIMIT, asked_limits, sinusoid_options
+from experiments.options import DESIGN, LIMIT_PAIR, RATE_LIMIT, SCHEDULER, asked_limits, sinusoid_options
 from experiments.pair_options import PairCommand
 from identification.base.axis_option import AXIS
 from identification.base.command_line import together
@@ -22,7 +22,7 @@ plant_options = together(
     click.option(
         "--seed", type=int, required=True, help="Of the random numbers; plant i is the same in every campaign."
     ),
-    click.option("--scheduler", metavar="ADDRESS", help="Run on the Dask cluster with this scheduler, not here."),
+    SCHEDULER,
     click.option("--output", type=OUTPUT_FILE, required=True, help="Parquet file to write."),
     click.option("--anew", is_flag=True, help="Remove what another campaign that was interrupted has kept there."),
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import sys
+from functools import partial
 from pathlib import Path
 
 import click
@@ -15,11 +16,10 @@ from tqdm import tqdm
 from design.design_file import Design
 from experiments.campaign.checkpoint import CampaignFile
 from experiments.campaign.distributions import PERCENT, RUNS, campaign_tables
-from experiments.campaign.run_plants import Campaign, code_sha256
-from experiments.campaign.workers import run_here, run_on_cluster
-from experiments.engine.simulate import limits_text
-from experiments.runs.guarantee import sector_text
+from experiments.campaign.run_plants import Campaign, run_chunk
 from experiments.runs.references import Reference
+from experiments.runs.words import limits_text, sector_text
+from experiments.runs.workers import WorkersLostError, spread
 from identification.base import process
 from identification.base.errors import InputError
 from identification.base.files import read_bytes
@@ -66,7 +66,7 @@ def run_campaign(
             f"--plants is {plants} and --seed {seed}; expected 1 to {MOST_PLANTS} plants, a seed from 0 on"
         )
     digest = hashlib.sha256(read_bytes(design)).hexdigest()
-    campaign = Campaign(content, digest, seed, reference, limits, periods, code_sha256(), rate_limit)
+    campaign = Campaign(content, digest, seed, reference, limits, periods, rate_limit)
     with locked_file(output):
         file = CampaignFile(output, campaign, plants, design, anew)
         there = plants - sum(last - first for first, last in file.missing)
@@ -88,18 +88,21 @@ def _complete(file: CampaignFile, campaign: Campaign, plants: int, scheduler: st
     missing = file.missing
     left = sum(last - first for first, last in missing)
     if missing:
-        done = run_here(campaign, missing) if scheduler is None else run_on_cluster(campaign, missing, scheduler)
+        done = spread(partial(run_chunk, campaign), missing, scheduler)
         try:
             with tqdm(total=plants, initial=plants - left, desc="campaign", unit=" plants", disable=None) as bar:
                 runs = f"{left} plants, {len(RUNS)} runs of {campaign.horizon_s:.6g} s each"
                 if not bar.disable:
                     bar.write(f"{runs}; what is done is kept in {file.folder}", file=sys.stderr)
-                for chunk, columns in done:
+                for number, columns in done:
+                    chunk = missing[number]
                     file.keep(chunk, columns)
                     left -= chunk[1] - chunk[0]
                     bar.update(chunk[1] - chunk[0])
                     kept = f"{plants - left} of {plants} plants are kept in {file.folder}"
                     process.leaves(f"{kept}; the same command goes on")
+        except WorkersLostError as error:
+            raise InputError(f"{error}; the same command goes on from what is done") from None
         finally:
             done.close()
     file.finish()

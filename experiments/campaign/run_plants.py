@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,9 +25,9 @@ from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
 SAMPLES_PER_PERIOD = 500
-CHUNK = 25  # plants that one task runs
 MEASURED = ("peak_error", "steady_error", "recovery_s", "last_saturation_s", "events")  # of a run that does not diverge
 
+Chunk = tuple[int, int]
 Columns = dict[str, list[Any]]
 
 
@@ -51,8 +49,6 @@ class Campaign:
         (lower, upper), in the actuator's unit.
     periods
         Length of a run in :attr:`span_s`.
-    code_sha256
-        Of the code that asks for it, see :func:`code_sha256`.
     rate_limit
         The most that the actuator changes in a second, in its unit.
     """
@@ -63,7 +59,6 @@ class Campaign:
     reference: Reference
     limits: tuple[float, float]
     periods: int
-    code_sha256: str
     rate_limit: float = math.inf
 
     @property
@@ -77,26 +72,15 @@ class Campaign:
         return self.periods * self.span_s
 
 
-@lru_cache(maxsize=1)
-def code_sha256() -> str:
-    """The sha256 of this package's rooms up to this one, of their modules' names and texts."""
-    digest = hashlib.sha256()
-    above = Path(__file__).parents[2]
-    for room in ("identification", "design", "experiments"):
-        for module in sorted((above / room).rglob("*.py")):
-            digest.update(str(module.relative_to(above)).encode() + module.read_bytes())
-    return digest.hexdigest()
-
-
-def run_chunk(campaign: Campaign, first: int, last: int) -> Columns:
-    """Draw and run the plants ``first`` to ``last`` - 1, the same whatever the chunk, the process and the machine.
+def run_chunk(campaign: Campaign, chunk: Chunk) -> Columns:
+    """Draw and run the plants of a chunk, the same whatever the chunk, the process and the machine.
 
     Parameters
     ----------
     campaign
         What they share.
-    first, last
-        Numbers of plants, the first one 0.
+    chunk
+        Number of its first plant, the very first being 0, and of the one after its last.
 
     Returns
     -------
@@ -137,18 +121,15 @@ def run_chunk(campaign: Campaign, first: int, last: int) -> Columns:
     Raises
     ------
     InputError
-        A plant cannot be drawn or a loop not be simulated, and the sentence names the plant; or the code that runs
-        is not that which asked for it.
+        A plant cannot be drawn or a loop not be simulated, and the sentence names the plant.
 
     Notes
     -----
     The errors are those at 500 samples a period. The runs start from rest.
     """
-    if campaign.code_sha256 != code_sha256():
-        raise InputError("a worker has other code of this package than the command; expected the same, to the byte")
     prepared = _prepared(campaign)
     columns: Columns = {}
-    for index in range(first, last):
+    for index in range(*chunk):
         try:
             rows = prepared.rows(index)
         except InputError as error:

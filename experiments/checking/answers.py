@@ -12,7 +12,7 @@ from experiments.checking.check_model import ModelCheck, SweepCheck
 from experiments.checking.design_on_plant import OnPlant, Promise
 from experiments.checking.parameter_moves import Move, tests_differ
 from experiments.checking.within_bound import Reach
-from experiments.runs.guarantee import sector_text
+from experiments.runs.words import sector_text
 from identification.base.digits import told_apart
 from identification.model.parameter import Parameter
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 
 import numpy as np
@@ -86,7 +86,7 @@ def matched_controller(
     theta = realize(Block(0.0), Block(0.0))
     if anti_windup is not None:
         one_plus = _by_tustin(anti_windup.one_plus, plant_block(design.plant).unstable_poles, T)
-        both = realize(one_plus, one_plus * P_d)
+        both = realize(one_plus, anti_windup.deviation(P_d, one_plus))
         theta = StateSpace(both.A, both.b, both.C, both.d - [1.0, 0.0])
     return _sampled(realize(forward), [0], T), feedback, _sampled(theta, [0, samples], T)
 
@@ -170,18 +170,22 @@ def _images(roots: Sequence[complex], T: float) -> tuple[complex, ...]:
     return tuple(image(root, T) for root in roots)
 
 
-def _by_tustin(block: Block, kept: tuple[complex, ...], T: float) -> Block:
-    """A block of as many zeros as poles by Tustin's rule, in w; a zero among ``kept`` moves to exp(s T) instead."""
-    zeros = [1.0 if zero in kept else 1 - zero * T / 2 for zero in block.zeros]
-    poles = [1 - pole * T / 2 for pole in block.poles]
-    if min(np.abs([*zeros, *poles]), default=1.0) < 1e-12:
-        raise InputError(f"theta1~ has a root at {2 / T:.6g} rad/s, twice the rate; expected another rate")
-    moved = zip(block.zeros, zeros, strict=True)
-    return Block(
-        block.gain * float(np.real(np.prod(zeros) / np.prod(poles))),
-        tuple(image(zero, T) if zero in kept else zero / factor for zero, factor in moved),
-        tuple(pole / factor for pole, factor in zip(block.poles, poles, strict=True)),
-    )
+def _by_tustin(block: Block, kept: Iterable[complex], T: float) -> Block:
+    """A block of as many zeros as poles by Tustin's rule, in w.
+
+    A zero among ``kept``, and a pole on the imaginary axis, which the controller has too, moves to exp(s T) instead.
+    """
+    kept = {*kept, *(pole for pole in block.poles if not pole.real)}
+
+    def moved(roots: Sequence[complex]) -> tuple[tuple[complex, ...], complex]:
+        factors = [1.0 if root in kept else 1 - root * T / 2 for root in roots]
+        if min(np.abs(factors), default=1.0) < 1e-12:
+            raise InputError(f"theta1~ has a root at {2 / T:.6g} rad/s, twice the rate; expected another rate")
+        there = (image(root, T) if root in kept else root / by for root, by in zip(roots, factors, strict=True))
+        return tuple(there), complex(np.prod(factors))
+
+    (zeros, above), (poles, below) = moved(block.zeros), moved(block.poles)
+    return Block(block.gain * (above / below).real, zeros, poles)
 
 
 def _sampled(system: StateSpace, first: Sequence[int], T: float) -> SampledBlock:

@@ -91,11 +91,6 @@ def limit_pair(limits: float | Sequence[float]) -> tuple[float, float]:
     return low, high
 
 
-def limits_text(low: float, high: float) -> str:
-    """Both limits in words, ``+-12`` or ``-3 to 12``."""
-    return f"+-{high:.4g}" if low == -high else f"{low:.4g} to {high:.4g}"
-
-
 class DivergenceError(InputError):
     """The control passed 1e100 times the limits, or without limits a state 1e100, at ``time_s`` seconds."""
 

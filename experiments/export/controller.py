@@ -9,7 +9,8 @@ import numpy as np
 from design.design_file import Design
 from experiments.drive.difference_equations import SampledBlock
 from experiments.drive.sampled_loop import Drive, controller_blocks
-from experiments.runs.guarantee import Guarantee, guarantee, sector_text
+from experiments.runs.guarantee import Guarantee, guarantee
+from experiments.runs.words import sector_text
 from identification.base.errors import InputError
 from identification.model.signals import Signals
 

@@ -183,22 +183,28 @@ class RestLimit:
         """
         if not band > 0:
             raise InputError(f"the band is {band:g}; expected a positive number")
-        return outward(self._first(lambda e: e.lower <= band)[0], self._first(lambda e: e.upper <= band)[1])
+        return outward(self._first(band, lambda e: e.lower)[0], self._first(band, lambda e: e.upper)[1])
 
-    def _first(self, inside: Callable[[Interval], bool]) -> tuple[float, float]:
-        """Two neighbouring t0 between which a statement that stays true as E falls becomes so; NaN if it never does."""
-        if inside(self.at(-1)):
+    def _first(self, band: float, end: Callable[[Interval], float]) -> tuple[float, float]:
+        """The last t0 known with an end of E's interval beyond the band, and the next, within it; NaN if none is.
+
+        The line through two t0 beyond the band says where it is reached, and twice, four times ... as far ahead where
+        it is not yet. From a t0 within the band it is a quarter of the way back.
+        """
+        if end(self.at(-1)) <= band:
             return 0.0, 0.0
-        if not inside(self.at(self.last)):
-            return math.nan, math.nan
-        outside, found = -1, self.last
-        while found - outside > 1:
-            middle = (outside + found) // 2
-            if inside(self.at(middle)):
-                found = middle
+        beyond, error, within, tried, ahead = -1, math.inf, self.last + 1, 0, 0.5
+        while within - beyond > 1:
+            found = end(self.at(tried))
+            if found <= band:
+                within, ahead = tried, 1.0
+                tried -= max(1, (within - beyond) // 4)
             else:
-                outside = middle
-        return self.start_s(outside), self.start_s(found)
+                fall = (error - found) / (tried - beyond)
+                way = ahead * (found - band) / fall if 0 < fall < math.inf else self.last / EVENLY
+                beyond, error, ahead = tried, found, 2 * ahead
+                tried += max(1, math.ceil(min(way, within - 1 - beyond)))
+        return (self.start_s(beyond), self.start_s(within)) if within <= self.last else (math.nan, math.nan)
 
     @cached_property
     def _program(self) -> PeakProgram:

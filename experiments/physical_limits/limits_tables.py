@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from experiments.physical_limits.least_peak_error import RestLimit, Tick, finite
 from experiments.runs.compare_anti_windups import NAMES, SETTLED, loops, run_all
 from experiments.runs.metrics import of_table, settling_time
 from experiments.runs.references import Reference
+from experiments.runs.workers import gathered
 from identification.model.plant import PlantModel
 
 FEWER_STEPS = 100  # of a period from rest, for the settling time alone
@@ -30,6 +32,7 @@ def limits_tables(
     tick: Tick = lambda: None,
     names: Sequence[str] = NAMES,
     rate_limit: float = math.inf,
+    scheduler: str | None = None,
 ) -> dict[str, pd.DataFrame]:
     """What the runs without and with anti-windup leave to gain, under several limits.
 
@@ -42,11 +45,13 @@ def limits_tables(
     limits
         Of the actuator, each (lower, upper), or one number for +- that.
     tick
-        Called after every program and after every set of runs.
+        Called after every program and after every set of runs; on a cluster after every limit.
     names
         The anti-windups that are run, see :meth:`design.design_file.Design.chosen`.
     rate_limit
         The most that the actuator changes in a second, of the runs; what no controller betters is that of the limits.
+    scheduler
+        Address of a Dask cluster's, on which each limit is a piece, see :mod:`experiments.runs.workers`; None: here.
 
     Returns
     -------
@@ -69,31 +74,53 @@ def limits_tables(
         See :func:`experiments.physical_limits.least_peak_error.periodic_limit`.
     """
     plant, name = design.loop_plant, design.kind.replace("-", "_")
-    required = reference.required(plant).value
     harmonic(plant, reference)
     pairs = [finite_limits(plant, limit) for limit in limits]
-    rest = RestLimit(plant, reference, pairs[0], tick=tick)
-    summary = rest.table().assign(**_named(pairs[0]), rate_limit=of_table(rate_limit))
-    evenly = np.linspace(0.0, RUN_PERIODS * reference.period_s, RUN_PERIODS * SAMPLES_PER_PERIOD + 1)
-    time_s, every, rows = np.union1d(evenly, summary["start_s"]), loops(design, reference, names), []
-    for pair in sorted(set(pairs), key=lambda pair: (pair[1] - pair[0], pair)):
-        runs = run_all(every, pair, time_s, rate_limit)
-        tick()
-        errors = {run: np.abs(result.outputs["error"]) for run, result in runs.items()}
-        facts = _named(pair) | {"rate_limit": of_table(rate_limit), "required": required}
-        rows.append(facts | _row(plant, reference, pair, time_s, errors, tick))
-        if pair == pairs[0]:
-            counted = time_s <= rest.horizon_s
-            for run, error in errors.items():
-                tails = np.maximum.accumulate(error[counted][::-1])[::-1]
-                summary[f"tail_{run}"] = tails[np.searchsorted(time_s, summary["start_s"])]
-            reached = summary[["rest_upper", *(f"tail_{run}" for run in errors)]].min(axis=1)
-            summary["rest_upper"] = np.maximum(reached, summary["rest_lower"])
-    return {f"limits_{name}": pd.DataFrame(rows), f"limits_{name}_summary": summary}
+    rows = [(pair, False) for pair in sorted(set(pairs), key=lambda pair: (pair[1] - pair[0], pair))]
+    items, work = [(pairs[0], True), *rows], partial(limit_table, design, reference, names, rate_limit)
+    if scheduler is None:
+        summary, *found = [work(item, tick=tick) for item in items]
+    else:
+        summary, *found = gathered(work, items, scheduler, tick)
+    return {f"limits_{name}": pd.concat(found, ignore_index=True), f"limits_{name}_summary": summary}
 
 
-def _named(limits: tuple[float, float]) -> dict[str, float]:
-    return {"lower_limit": limits[0], "limit": limits[1]}
+def limit_table(
+    design: Design,
+    reference: Reference,
+    names: Sequence[str],
+    rate_limit: float,
+    item: tuple[tuple[float, float], bool],
+    tick: Tick = lambda: None,
+) -> pd.DataFrame:
+    """What :func:`limits_tables` holds of one pair of limits.
+
+    Parameters
+    ----------
+    design, reference, names, rate_limit, tick
+        As there.
+    item
+        (lower, upper), and whether the table is ``limits_KIND_summary``, and not the pair's row of ``limits_KIND``.
+    """
+    pair, summed_up = item
+    plant, facts = design.loop_plant, {"lower_limit": pair[0], "limit": pair[1], "rate_limit": of_table(rate_limit)}
+    time_s = np.linspace(0.0, RUN_PERIODS * reference.period_s, RUN_PERIODS * SAMPLES_PER_PERIOD + 1)
+    if summed_up:
+        rest = RestLimit(plant, reference, pair, tick=tick)
+        summary = rest.table().assign(**facts)
+        time_s = np.union1d(time_s[time_s <= rest.horizon_s], summary["start_s"])
+    runs = run_all(loops(design, reference, names), pair, time_s, rate_limit)
+    tick()
+    errors = {run: np.abs(result.outputs["error"]) for run, result in runs.items()}
+    if not summed_up:
+        facts["required"] = reference.required(plant).value
+        return pd.DataFrame([facts | _row(plant, reference, pair, time_s, errors, tick)])
+    for run, error in errors.items():
+        tails = np.maximum.accumulate(error[::-1])[::-1]
+        summary[f"tail_{run}"] = tails[np.searchsorted(time_s, summary["start_s"])]
+    reached = summary[["rest_upper", *(f"tail_{run}" for run in errors)]].min(axis=1)
+    summary["rest_upper"] = np.maximum(reached, summary["rest_lower"])
+    return summary
 
 
 def _row(

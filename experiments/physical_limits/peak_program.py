@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 import clarabel
 import numpy as np
 import scipy.sparse as sparse
-from scipy.linalg import expm
 
+from experiments.physical_limits.averages import average, best, spread
 from experiments.physical_limits.certificates import Samples, forced, reached, whole
 from experiments.physical_limits.exact_chain import fastest
 from experiments.physical_limits.intervals import Interval, outward
@@ -22,13 +22,14 @@ from identification.model.plant import PlantModel
 
 SAMPLES = 4  # times in a step at which the program knows the error; one, its middle, of a plant whose output jumps
 REFINED = 4  # parts of a step, each with a value of u of its own, near the time from which the error counts
+GRAINS = SAMPLES * REFINED  # of a step: at whole ones lie the samples of a part
 NEAR = (20, 2)  # steps before and after that time that are refined
-PHASE = 0.3  # most that the fastest pole turns or decays within a cell, rad
+PHASE = 0.6  # most that the fastest pole turns or decays within a cell, rad
 WIDTHS = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0)  # of the averages that are tried, in steps
-PASSES = 3  # three boxes in a row are a smooth bell
 SPARE = 6  # steps at the end of a start from rest that only serve the averages
 LOST = 1e-3  # of the weights may lie beyond the time to which the error counts, or that much of r is hardly an error
 MOST_CELLS = 2_000_000
+SOLVED = 1e-6  # to this share of r the program is; what that leaves open, the bounds count
 GRAIN = 1e-8  # of the distance of the limits, more than a grain in so many cells
 
 
@@ -152,19 +153,24 @@ class PeakProgram:
         gain, shares = size / scale, (limits[0] / size, limits[1] / size)
         u, mu = self._optimum(r.values, gain, shares, slice(first, len(values)))
         cells, more = self._cells, gain * (1 + 2 * UNIT)
-        controls = (whole(self._average(u, width, first), self._centred) for width in WIDTHS)
-        upper = min(reached(cells, control, r, more, counted) for control in controls)
+        controls = (whole(average(u, self._half(width), first, self.periodic), self._centred) for width in WIDTHS)
+        upper = -best(-reached(cells, control, r, more, counted) for control in controls)
         weighed = slice(first, self.counted - (cells.jumps and not self.periodic))
         if upper > LOST and np.abs(mu[weighed.stop :]).sum() > LOST * np.abs(mu).sum():
             _, mu = self._optimum(r.values, gain, shares, weighed)
-        weights = [self._weights(mu, width, weighed) for width in WIDTHS] if mu[weighed].any() else []
-        lowers = [forced(cells, each, r, more, shares) for each in weights]
-        return outward(scale * max([0.0, *lowers]), scale * upper)
+        weights = (self._weights(mu, width, weighed) for width in WIDTHS if mu[weighed].any())
+        lower = best(forced(cells, each, r, more, shares) for each in weights)
+        return outward(scale * max(0.0, lower), scale * upper)
 
     def _weights(self, mu: np.ndarray, width: float, counted: slice) -> np.ndarray:
         """Averaged weights for :func:`experiments.physical_limits.certificates.forced`, none at the end of the span."""
-        weights = self._average(mu, width, 0) if self.periodic else self._spread(mu, width, counted)
+        half = self._half(width)
+        weights = average(mu, half, 0, periodic=True) if self.periodic else spread(mu, half, counted)
         return whole(weights / np.abs(weights).sum(), self._centred)
+
+    def _half(self, width: float) -> int:
+        """Cells to either side of one, of an average as wide as so many steps."""
+        return int(width * self.fineness / 2)
 
     def _edges(self, first: int) -> np.ndarray:
         """Where the steps begin and end, in cells; from rest they are refined near ``first``."""
@@ -186,53 +192,54 @@ class PeakProgram:
         """
         off = GRAIN * (shares[1] - shares[0])
         low, high = shares[0] + off * (shares[0] != -1), shares[1] - off * (shares[1] != 1)
-        c, d, n, jumps = self._cells.chain.c[None, :], self._cells.chain.d, len(self._cells.chain.b), self._cells.jumps
-        edges = self._edges(counted.start)
-        lengths = np.diff(edges)
+        chain, edges, grain = self._cells.chain, self._edges(counted.start), self.fineness // GRAINS
+        n, lengths = len(chain.b), np.diff(edges)
         steps = len(lengths)
-        ends = steps + (not self.periodic)
-        state = sparse.eye_array(ends).tocsr()[:, 0 if self.periodic else 1 :]
-        before, after = state[:steps], state[np.arange(1, steps + 1) % ends]
-        dynamics: Any = sparse.hstack([sparse.kron(after, np.eye(n)), sparse.csr_array((n * steps, steps + 1))])
-        outputs, samples = [], []
-        for length in np.unique(lengths):
-            chosen = np.flatnonzero(lengths == length)
-            these = sparse.eye_array(steps).tocsr()[chosen]
-            kept, driven = self._over(length)
-            nothing = sparse.csr_array((n * steps, 1))
-            flow = [sparse.kron(these.T @ these @ before, kept), sparse.kron(these.T @ these, driven[:, None])]
-            dynamics = dynamics - sparse.hstack([*flow, nothing])
-            for inside in [length // 2] if jumps else range(0, length, length // SAMPLES):
-                kept, driven = self._over(inside)
-                outputs.append(sparse.hstack([sparse.kron(these @ before, c @ kept), ((c @ driven)[0] + d) * these]))
-                samples.append(edges[chosen] + inside)
-        if not (self.periodic or jumps):
-            outputs.append(sparse.hstack([sparse.kron(state[-1:], c), sparse.csr_array((1, steps))]))
-            samples.append(edges[-1:])
-        sampled = np.concatenate(samples)
-        judged = np.flatnonzero((sampled >= counted.start) & (sampled < counted.stop))
-        output, sampled = gain * sparse.vstack(outputs).tocsr()[judged], sampled[judged]
-        peak = sparse.csr_array(-np.ones((len(judged), 1)))
-        both: Any = sparse.vstack([sparse.hstack([output, peak]), sparse.hstack([-output, peak])])
-        control = slice(output.shape[1] - steps, output.shape[1])
-        held = sparse.eye_array(output.shape[1] + 1).tocsr()[control]
+        within = np.array([0.5]) if self._cells.jumps else np.arange(SAMPLES) / SAMPLES
+        seen, inside = np.repeat(np.arange(steps), len(within)), np.outer(lengths, within).ravel().astype(int)
+        if not (self.periodic or self._cells.jumps):
+            seen, inside = np.append(seen, steps - 1), np.append(inside, lengths[-1])
+        sampled = edges[seen] + inside
+        judged = (sampled >= counted.start) & (sampled < counted.stop)
+        seen, inside, sampled = seen[judged], inside[judged], sampled[judged]
+        output = gain * (chain.c @ self._flows[inside // grain] + np.append(np.zeros(n), chain.d))[:, None, :]
+
+        over, k, above = self._flows[lengths // grain], np.arange(steps), n * steps + np.arange(len(seen))
+        states = n * (steps + (not self.periodic))
+        below, highest, unity = above + len(seen), n * steps + 2 * len(seen) + k, np.ones((steps, 1, 1))
+        peak = np.full(len(seen), states + steps), np.full((len(seen), 1, 1), -1.0)
+        blocks = [
+            (n * k, n * (k + 1) % states, np.broadcast_to(np.eye(n), (steps, n, n))),
+            (n * k, n * k, -over[:, :, :n]),
+            (n * k, states + k, -over[:, :, n:]),
+            (above, n * seen, output[:, :, :n]),
+            (above, states + seen, output[:, :, n:]),
+            (above, *peak),
+            (below, n * seen, -output[:, :, :n]),
+            (below, states + seen, -output[:, :, n:]),
+            (below, *peak),
+            (highest, states + k, unity),
+            (highest + steps, states + k, -unity),
+        ]
+        matrix = _of_blocks(blocks)[:, 0 if self.periodic else n :]
         settings = clarabel.DefaultSettings()
         settings.verbose = False
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = SOLVED
         solution = clarabel.DefaultSolver(
-            sparse.csc_matrix((both.shape[1], both.shape[1])),
-            np.append(np.zeros(output.shape[1]), 1.0),
-            sparse.csc_matrix(sparse.vstack([dynamics, both, held, -held])),
+            sparse.csc_matrix((matrix.shape[1], matrix.shape[1])),
+            np.append(np.zeros(matrix.shape[1] - 1), 1.0),
+            matrix,
             np.concatenate([np.zeros(n * steps), r[sampled], -r[sampled], np.full(steps, high), np.full(steps, -low)]),
-            [clarabel.ZeroConeT(n * steps), clarabel.NonnegativeConeT(both.shape[0] + 2 * steps)],
+            [clarabel.ZeroConeT(n * steps), clarabel.NonnegativeConeT(2 * len(seen) + 2 * steps)],
             settings,
         ).solve()
         if not (np.isfinite(solution.x).all() and np.isfinite(solution.z).all()):
             raise InputError(
-                f"the linear program of the least error, of {both.shape[1]} unknowns, was not solved (the solver says: "
-                f"{solution.status}); expected a plant whose poles and zeros differ less"
+                f"the linear program of the least error, of {matrix.shape[1]} unknowns, was not solved (the solver "
+                f"says: {solution.status}); expected a plant whose poles and zeros differ less"
             )
-        u, prices = np.clip(np.asarray(solution.x)[control], low, high), -np.asarray(solution.z)[n * steps :]
-        weights = prices[: len(judged)] - prices[len(judged) : 2 * len(judged)]
+        u, prices = np.clip(np.asarray(solution.x)[-1 - steps : -1], low, high), -np.asarray(solution.z)[n * steps :]
+        weights = prices[: len(seen)] - prices[len(seen) : 2 * len(seen)]
         if self._centred:
             u, weights = u - u.mean(), weights - weights.mean()
             u = u / max(1.0, u.min() / low, u.max() / high)
@@ -240,35 +247,26 @@ class PeakProgram:
         mu[sampled] = weights
         return np.repeat(u, lengths), mu
 
-    def _over(self, cells: int) -> tuple[np.ndarray, np.ndarray]:
-        """What becomes of the states in so many cells, by themselves and under u = 1."""
+    @cached_property
+    def _flows(self) -> np.ndarray:
+        """What becomes of the states in 0, 1 ... all grains of a step, by themselves and under u = 1, side by side."""
         chain = self._cells.chain
         n = len(chain.b)
-        both = expm(cells * np.block([[chain.A, chain.b[:, None]], [np.zeros((1, n + 1))]]))
-        return both[:n, :n], both[:n, n]
+        cell = np.block([[chain.flow, chain.pulse[:, None]], [np.zeros((1, n)), np.ones((1, 1))]])
+        grain, flows = np.linalg.matrix_power(cell, self.fineness // GRAINS), [np.eye(n + 1)]
+        for _ in range(GRAINS):
+            flows.append(grain @ flows[-1])
+        return np.array(flows)[:, :n]
 
-    def _average(self, values: np.ndarray, width: float, first: int) -> np.ndarray:
-        """Repeated moving averages, from ``first`` on, of values in the cells or, if periodic, at their ends.
 
-        Where there is no period to go on with, the values are mirrored at both ends.
-        """
-        half, later = int(width * self.fineness / 2), values[first:]
-        for _ in range(PASSES):
-            total = np.append(0.0, np.cumsum(np.pad(later, half, mode="wrap" if self.periodic else "symmetric")))
-            later = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-        return np.append(values[:first], later)
-
-    def _spread(self, mu: np.ndarray, width: float, counted: slice) -> np.ndarray:
-        """The weights that count, each spread evenly to both sides, again and again, as far as the ends allow.
-
-        That keeps their sum and their mean time, and so the costates of two integrators before them.
-        """
-        weights, later = np.zeros_like(mu), mu[counted]
-        place = np.arange(len(later))
-        half = np.minimum(int(width * self.fineness / 2), np.minimum(place, place[::-1]))
-        for _ in range(PASSES):
-            rises = np.bincount(place - half, later / (2 * half + 1), len(later) + 1)
-            falls = np.bincount(place + half + 1, later / (2 * half + 1), len(later) + 1)
-            later = np.cumsum(rises - falls)[:-1]
-        weights[counted] = later
-        return weights
+def _of_blocks(blocks: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> sparse.csc_matrix:
+    """The matrix of dense blocks: the rows (k,) and columns (k,) of their upper left entries, the blocks (k, n, m)."""
+    rows, columns, values = [], [], []
+    for first_row, first_column, block in blocks:
+        _, n, m = block.shape
+        rows.append(np.broadcast_to(first_row[:, None, None] + np.arange(n)[:, None], block.shape).ravel())
+        columns.append(np.broadcast_to(first_column[:, None, None] + np.arange(m), block.shape).ravel())
+        values.append(block.ravel())
+    entries = np.concatenate(values)
+    kept = entries != 0
+    return sparse.csc_matrix((entries[kept], (np.concatenate(rows)[kept], np.concatenate(columns)[kept])))

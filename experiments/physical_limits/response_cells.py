@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 
 from experiments.physical_limits.exact_chain import TINY, Chain, chain, positive_exponential
+from identification.base.compiled import njit
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
@@ -66,24 +67,24 @@ class Cells:
         """
         weighted = mu[::-1, None] * self._seen
         if self.start == "periodic":
-            return self._driven(weighted, np.zeros(len(self.chain.b)), adjoint=True)[::-1]
-        return self._driven(weighted[1:], weighted[0], adjoint=True)[::-1]
+            p = self._driven(weighted, np.zeros(len(self.chain.b)), adjoint=True)
+        else:
+            p = self._driven(weighted[1:], weighted[0], adjoint=True)
+        return np.ascontiguousarray(p[::-1])
 
     def state_defects(self, u: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Bounds of |x_{k+1} - exp(A) x_k - pulse u_k| for the numbers x of :meth:`states`, shape (n,), over all k."""
         flow, pulse = self.chain.flow, self.chain.pulse
-        size = np.abs(x[1:]) + np.abs(x[:-1]) @ np.abs(flow).T + np.abs(u)[:, None] * np.abs(pulse)
-        defect = np.abs(x[1:] - (x[:-1] @ flow.T + u[:, None] * pulse))
-        return np.asarray((defect + self._roundings * size).max(axis=0) * SPARE + TINY)
+        largest, _ = defects(flow, x[:-1], x[1:], u[:, None] * pulse, self._roundings)
+        return np.asarray(largest * SPARE + TINY)
 
     def costate_defects(self, mu: np.ndarray, p: np.ndarray) -> np.ndarray:
         """The sums over k of bounds of |p_k - p_{k+1} exp(A) - mu_k c|, shape (n,)."""
         flow, c = self.chain.flow, self._seen
         following = p[1:] if self.start == "periodic" else np.vstack([p[1:], np.zeros(len(c))])
         p = p[:-1] if self.start == "periodic" else p
-        size = np.abs(p) + np.abs(following) @ np.abs(flow) + np.abs(mu)[:, None] * np.abs(c)
-        defect = np.abs(p - (following @ flow + mu[:, None] * c))
-        return np.asarray((defect + self._roundings * size).sum(axis=0) * SPARE + len(p) * TINY)
+        _, total = defects(np.ascontiguousarray(flow.T), following, p, mu[:, None] * c, self._roundings)
+        return np.asarray(total * SPARE + len(p) * TINY)
 
     @property
     def jumps(self) -> bool:
@@ -200,38 +201,17 @@ class Cells:
         return np.asarray(np.abs(inverse) + _norm(inverse) * doubt / (1 - doubt))
 
     def _driven(self, inputs: np.ndarray, first: np.ndarray, adjoint: bool = False) -> np.ndarray:
-        """x_{k+1} = exp(A) x_k + inputs_k, or with exp(A)^T, in floating point, by blocks of about sqrt(count) cells.
+        """x_{k+1} = exp(A) x_k + inputs_k, or with exp(A)^T, in floating point; shape (count + 1, n).
 
-        Where it is periodic, it starts from where it ends; else from ``first``. Shape (count + 1, n).
+        Where it is periodic, it starts from where it ends; else from ``first``.
         """
-        powers = np.swapaxes(self._powers, 1, 2) if adjoint else self._powers
-        (count, n), width = inputs.shape, len(powers) - 1
-        blocks = -(-count // width)
-        padded = np.zeros((blocks * width, n))
-        padded[:count] = inputs
-        local = np.zeros((width + 1, blocks, n))
-        for j in range(width):
-            local[j + 1] = local[j] @ powers[1].T + padded[j::width]
-
-        def starts(first: np.ndarray) -> np.ndarray:
-            x = np.empty((blocks, n))
-            x[0] = first
-            for i in range(blocks - 1):
-                x[i + 1] = powers[width] @ x[i] + local[width, i]
-            return x
-
+        flow = np.ascontiguousarray(self.chain.flow.T if adjoint else self.chain.flow)
+        x: np.ndarray = driven(flow, inputs, first)
         if self.start == "periodic":
-            block, j = divmod(count, width)
-            end = local[j or width, -1] + powers[j or width] @ starts(first)[-1]
-            lacking = np.eye(n) - np.linalg.matrix_power(powers[width], block) @ powers[j]
-            first = self._returning(lacking, end, adjoint)
-        moved = (starts(first) @ powers[:width].reshape(-1, n).T).reshape(blocks, width, n)
-        x = (np.swapaxes(local[:width], 0, 1) + moved).reshape(-1, n)[: count + 1]
-        if len(x) == count:
-            x = np.vstack([x, powers[1] @ x[-1] + inputs[-1]])
-        if self.start == "periodic":
+            lacking = np.eye(len(flow)) - np.linalg.matrix_power(flow, len(inputs))
+            x = driven(flow, inputs, self._returning(lacking, x[-1], adjoint))
             x[-1] = x[0]
-        return np.asarray(x)
+        return x
 
     def _returning(self, lacking: np.ndarray, end: np.ndarray, adjoint: bool) -> np.ndarray:
         """x with lacking x = end. Of integrators one component is free, taken as 0, and one equation follows."""
@@ -243,6 +223,41 @@ class Cells:
         else:
             x[:] = np.linalg.lstsq(lacking, end)[0]
         return x
+
+
+@njit()
+def driven(flow: np.ndarray, inputs: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """x_0 = ``first``, x_{k+1} = flow x_k + inputs_k, shape (count + 1, n), for ``inputs`` of the shape (count, n)."""
+    count, n = inputs.shape
+    x = np.empty((count + 1, n))
+    x[0] = first
+    for k in range(count):
+        for i in range(n):
+            total = inputs[k, i]
+            for j in range(n):
+                total += flow[i, j] * x[k, j]
+            x[k + 1, i] = total
+    return x
+
+
+@njit()
+def defects(
+    flow: np.ndarray, x: np.ndarray, y: np.ndarray, inputs: np.ndarray, share: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The largest and the sum of |y_k - flow x_k - inputs_k| and of a share of the sizes in it, each of shape (n,)."""
+    count, n = x.shape
+    largest, total = np.zeros(n), np.zeros(n)
+    for k in range(count):
+        for i in range(n):
+            defect, size = y[k, i] - inputs[k, i], abs(y[k, i]) + abs(inputs[k, i])
+            for j in range(n):
+                part = flow[i, j] * x[k, j]
+                defect -= part
+                size += abs(part)
+            found = abs(defect) + share * size
+            largest[i] = max(largest[i], found)
+            total[i] += found
+    return largest, total
 
 
 def _norm(matrix: np.ndarray) -> float:

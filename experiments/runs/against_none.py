@@ -11,13 +11,14 @@ from design.blocks.block import fastest_root, plant_block
 from design.design_file import Design
 from experiments.engine.compiled_loop import FURTHEST as STEP
 from experiments.engine.saturated_loop import SaturatedLoop
-from experiments.engine.simulate import DivergenceError, Run, limit_pair, limits_text, simulate
+from experiments.engine.simulate import DivergenceError, Run, limit_pair, simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference
 from experiments.runs.region import longest_run, require_within_region
 from experiments.runs.run_length import span
 from experiments.runs.sector_promise import finely
 from experiments.runs.simulate_design import SAMPLES
+from experiments.runs.words import limits_text
 from identification.base.errors import InputError
 
 ROOM = 1.2

@@ -7,24 +7,30 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import NamedTuple, TypeVar
+from functools import cache, partial
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from tqdm import tqdm
 
 from design.design_file import Asked, Design
+from experiments.engine.ready_loop import ReadyLoop, ready_loop
 from experiments.engine.simulate import Run, limit_pair, simulate_watched
 from experiments.engine.watched import STOP, watch
 from experiments.runs.design_loop import Controller, plant_loop, realized_controller
 from experiments.runs.references import Reference, SampledReference
+from experiments.runs.workers import gathered
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
 IN_FLIGHT = 4  # runs a worker
+PIECES = 128  # sent to a cluster
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 Tick = Callable[[], object]
+Each = Callable[[Callable[[Any], Any], Sequence[Any]], list[Any]]
+"""Of a function and items, the results in the order of the items, wherever they are computed."""
 
 
 class Case(NamedTuple):
@@ -82,19 +88,35 @@ def simulate_many(
     if count < 1:
         raise InputError(f"{count} workers are asked for; expected one at least")
     controllers = {name: realized_controller(design, kind) for name, kind in anti_windups.items()}
-    cases = (Case(plant, *rest) for plant in plants for rest in itertools.product(references, anti_windups, limits))
-    return _streamed(cases, controllers, time_s, count)
+    return _streamed(_cases(plants, references, controllers, limits), time_s, count)
+
+
+def _cases(
+    plants: Iterable[PlantModel],
+    references: Sequence[Reference | SampledReference],
+    controllers: Mapping[str, Controller],
+    limits: Sequence[float | tuple[float, float]],
+) -> Iterator[tuple[Case, Callable[[], ReadyLoop]]]:
+    """Each case with what makes its loop, which is made once for all limits."""
+    for plant in plants:
+        for reference, (name, controller) in itertools.product(references, controllers.items()):
+            loop = cache(partial(_ready, controller, plant, reference))
+            for limit in limits:
+                yield Case(plant, reference, name, limit), loop
+
+
+def _ready(controller: Controller, plant: PlantModel, reference: Reference | SampledReference) -> ReadyLoop:
+    return ready_loop(plant_loop(controller, plant, reference))
 
 
 def _streamed(
-    cases: Iterator[Case], controllers: Mapping[str, Controller], time_s: np.ndarray, workers: int
+    cases: Iterator[tuple[Case, Callable[[], ReadyLoop]]], time_s: np.ndarray, workers: int
 ) -> Iterator[tuple[Case, Run | InputError]]:
     state = watch()
 
-    def run(case: Case) -> Run | InputError:
+    def run(case: Case, loop: Callable[[], ReadyLoop]) -> Run | InputError:
         try:
-            loop = plant_loop(controllers[case.anti_windup], case.plant, case.reference)
-            return simulate_watched(loop, limit_pair(case.limit), time_s, state)
+            return simulate_watched(loop(), limit_pair(case.limit), time_s, state)
         except InputError as error:
             return error
 
@@ -103,7 +125,8 @@ def _streamed(
         try:
             while True:
                 ahead.extend(
-                    (case, pool.submit(run, case)) for case in itertools.islice(cases, IN_FLIGHT * workers - len(ahead))
+                    (case, pool.submit(run, case, loop))
+                    for case, loop in itertools.islice(cases, IN_FLIGHT * workers - len(ahead))
                 )
                 if not ahead:
                     return
@@ -115,7 +138,7 @@ def _streamed(
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def threaded(work: Callable[[Item], Result], items: Iterable[Item], tick: Tick) -> list[Result]:
+def threaded(work: Callable[[Item], Result], items: Iterable[Item], tick: Tick = lambda: None) -> list[Result]:
     """The results of ``work`` in the order of the items, by as many threads as there are cores; ticks for each."""
 
     def counted(item: Item) -> Result:
@@ -125,3 +148,16 @@ def threaded(work: Callable[[Item], Result], items: Iterable[Item], tick: Tick) 
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         return list(pool.map(counted, items))
+
+
+def on_cluster(
+    work: Callable[[Item], Result], items: Sequence[Item], scheduler: str, tick: Tick = lambda: None
+) -> list[Result]:
+    """The same on the Dask cluster of a scheduler, see :func:`experiments.runs.workers.spread`, in PIECES at most."""
+    size = max(1, -(-len(items) // PIECES))
+    pieces = [items[first : first + size] for first in range(0, len(items), size)]
+    return [result for part in gathered(partial(_each, work), pieces, scheduler, tick) for result in part]
+
+
+def _each(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    return [work(item) for item in items]

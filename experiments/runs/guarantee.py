@@ -17,6 +17,7 @@ from design.blocks.block import bound_block, plant_block
 from design.blocks.frequency_peak import frequency_grid
 from design.design_file import Asked, Design
 from design.stability.margins import delay_loop, margins_of, robustness_of
+from experiments.runs.words import sector_text
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
@@ -125,8 +126,3 @@ def _is_within(design: Design, true: PlantModel) -> bool:
     turned = np.gradient(omega) * abs(true.delay_s - plant.delay_s) > TURNED
     difference = np.where(turned, np.abs(true(s)) + np.abs(plant(s)), np.abs(true(s) - plant(s)))
     return bool(np.all(difference <= np.abs(bound(s))))
-
-
-def sector_text(sector: float, digits: int = 3) -> str:
-    """A sector in so many digits, of its distance from 1 in one less where that is small."""
-    return f"1 - {1 - sector:.{digits - 1}g}" if 0.9995 <= sector < 1 else f"{sector:.{digits}g}"

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from experiments.engine.simulate import Run
+if TYPE_CHECKING:
+    from experiments.engine.simulate import Run
 
 
 def last_saturation(run: Run) -> float:

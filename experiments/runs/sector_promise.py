@@ -29,6 +29,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from experiments.engine.ready_loop import ready_loop
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import Run, simulate
 from experiments.runs.guarantee import Guarantee
@@ -41,7 +42,7 @@ from identification.model.plant import PlantModel
 A_EXCURSION = 64  # samples of u between two crossings of the limits, at least
 A_TIME_CONSTANT = 10  # samples of u beyond the limits in the loop's shortest time constant
 REFINEMENTS = 8  # of the samples around the largest u and secant, and around where the guarantee is left
-A_REFINEMENT = 33  # samples of each, in place of three
+A_REFINEMENT = 1025  # samples of each, in place of three: twice so refined, a peak is as near as rounding shows
 A_PERIOD = 200  # samples of v_s in a period of the reference
 MOST_SAMPLES = 1e6
 EVENLY = 50_001  # samples of v for the bound on the windup
@@ -153,7 +154,7 @@ def judge_run(
     found = verdict(given, time_s, control, steady_control(reference, plant, time_s), limits)
     if not len(run.events_s) and control[0] == run.saturated_control[0]:
         return found
-    only_u = replace(loop, outputs={})
+    only_u = ready_loop(replace(loop, outputs={}))
     more = finely(loop, run, reference)
     for _ in range(REFINEMENTS):
         time_s, first = np.unique(np.append(time_s, more), return_index=True)
@@ -162,6 +163,7 @@ def judge_run(
         if found.agrees(before):
             break
         at = np.searchsorted(time_s, [found.farthest_control_at_s, found.needed_at_s, found.left_at_s])
+        at = at[at < len(time_s)]  # it may never be left
         around = time_s[np.clip(np.add.outer([-1, 1], at), 0, len(time_s) - 1)]
         more = np.unique(np.linspace(around[0], around[1], A_REFINEMENT))
     if given.sector < 1 or math.isinf(found.needed_sector):

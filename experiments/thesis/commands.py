@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from experiments.campaign.command import plant_options
-from experiments.options import DESIGN, OUTPUT_FOLDER, positive_limit
+from experiments.options import DESIGN, OUTPUT_FOLDER, SCHEDULER, positive_limit
 from experiments.tables import write_into
 from experiments.thesis.claims.commands import claims_command, coverage_command, equations_command
 from identification.base.command_line import CommandGroup
@@ -116,8 +116,9 @@ def chapter_4(design: Path, limit: float | None, output: Path) -> None:
 
 @thesis.command("limits")
 @DESIGN
+@SCHEDULER
 @OUTPUT_FOLDER
-def limits(design: Path, output: Path) -> None:
+def limits(design: Path, scheduler: str | None, output: Path) -> None:
     """What no controller of DESIGN's plant can better: limits_KIND.csv, limits_KIND_summary.csv."""
     from tqdm import tqdm
 
@@ -129,19 +130,25 @@ def limits(design: Path, output: Path) -> None:
     content = read_design(design)
     reference = thesis_reference(content.kind, content.reference_omegas)
     with tqdm(desc="limits", unit="", disable=None, leave=False) as bar:
-        write_into(output, limits_tables(content, reference, several_limits(content), bar.update))
+        asked = several_limits(content)
+        write_into(output, limits_tables(content, reference, asked, bar.update, scheduler=scheduler))
 
 
 @thesis.command("conditions")
+@SCHEDULER
 @OUTPUT_FOLDER
-def conditions(output: Path) -> None:
+def conditions(scheduler: str | None, output: Path) -> None:
     """What the thesis does not print, searched by what it does: conditions.csv, conditions_summary.csv."""
+    from functools import partial
+
     from tqdm import tqdm
 
+    from experiments.runs.batch import on_cluster, threaded
     from experiments.thesis.unprinted.search import conditions_tables
 
     with tqdm(desc="conditions", unit="", disable=None, leave=False) as bar:
-        write_into(output, conditions_tables(tick=bar.update))
+        there = partial(on_cluster, scheduler=scheduler) if scheduler else threaded
+        write_into(output, conditions_tables(each=partial(there, tick=bar.update)))
 
 
 @thesis.command("sampled-rates")

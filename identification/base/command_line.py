@@ -10,7 +10,6 @@ from collections.abc import Callable
 from typing import Any
 
 import click
-import numpy as np
 
 from identification.base.console import Console
 from identification.base.errors import InputError, printable
@@ -75,6 +74,8 @@ class CommandGroup(Console):
         super().add_command(cmd, name)
 
     def invoke(self, ctx: click.Context) -> Any:
+        import numpy as np  # which a command that only says its help needs not load
+
         atexit.register(gc.freeze)  # without it the interpreter sweeps all modules as it ends: a third of a second
         try:
             with np.errstate(over="raise"), warnings.catch_warnings(record=True) as held:  # a refusal is one sentence

@@ -18,21 +18,14 @@ from typing import Any
 import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
 
-from identification.base.temporary_cache import temporary_cache
+from identification.base.cache_folders import cache_folders
 
 
-def cache_folders() -> Iterator[Path]:
-    """Where files of this user may be kept, best first; folders that need not exist nor allow writing.
-
-    NUMBA_CACHE_DIR if it is set, antiwindup in XDG_CACHE_HOME or else in ~/.cache, a folder of the user's below /tmp.
-    """
+def _folders() -> Iterator[Path]:
+    """Where compiled code may be kept, best first: where NUMBA_CACHE_DIR says, if it is set, or with other caches."""
     if own := os.environ.get("NUMBA_CACHE_DIR"):
         yield Path(own)
-    users = Path(os.path.expanduser(os.environ.get("XDG_CACHE_HOME") or "~/.cache"))  # noqa: PTH111  # raises nothing
-    if users.is_absolute():
-        yield users / "antiwindup"
-    if (below := temporary_cache()) is not None:
-        yield below[0]
+    yield from cache_folders()
 
 
 @cache
@@ -45,7 +38,7 @@ def code_cache(package: str) -> Path | None:
     modules = sorted(Path(str(sys.modules[package].__file__)).parent.rglob("*.py"))
     texts = [text for text in (module.read_bytes() for module in modules) if b"njit" in text]
     digest = sha256(b"".join([numba.__version__.encode(), package.encode(), *texts])).hexdigest()[:16]
-    candidates = cache_folders()
+    candidates = _folders()
     while True:
         try:
             folder = next(candidates) / f"numba-{digest}"

@@ -159,7 +159,7 @@ def _writable_homes() -> None:
             barred[name] = folder
     if not barred:
         return
-    from identification.base.temporary_cache import temporary_cache
+    from identification.base.cache_folders import temporary_cache
 
     if (instead := temporary_cache()) is not None:
         kept, is_new = instead

@@ -11,8 +11,9 @@ from identification.base.arrays import Real, Whole
 from identification.base.errors import InputError
 from identification.bound.beyond import Beyond
 from identification.bound.envelope import WIDTH, Envelope, envelope_of, largest_of
+from identification.bound.orders import HIGHEST_ORDER
 from identification.bound.tightest_bound import Points, resonances, shares, tightest, within
-from identification.model.additive_bound import HIGHEST_ORDER, AdditiveBound
+from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
 from identification.model.reports import BoundReport, Excess, Touch
 from identification.sweeps.response import FrequencyResponse, require_one_band

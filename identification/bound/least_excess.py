@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 from scipy.optimize import linprog
 
 from identification.base.arrays import Complex, Real
@@ -94,7 +93,7 @@ def least_largest_excess(
         target = reached / (1 + step) ** 2
         if target <= 1:
             break
-        nearby = maximum_filter1d(bottom, NEIGHBOURS)
+        nearby = _largest_nearby(bottom)
         before = np.maximum(bottom, SMALLEST * nearby)
         most = target * allowed * before
         least = np.where(seen, top, most)
@@ -199,6 +198,12 @@ def _program(over: _Orthonormal, under: _Orthonormal, weight: Real) -> tuple[flo
         change = np.linalg.lstsq(shares, x[-1] * one - shares.sum(axis=1))[0]
         multipliers *= np.maximum(1 + change, 0.0)
     return float(x[-1]), x[:n], x[n:-1], multipliers[rows // 2 : rows], multipliers[: rows // 2]
+
+
+def _largest_nearby(values: Real) -> Real:
+    """The largest of each of (K,) positive values and its NEIGHBOURS."""
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(values, NEIGHBOURS // 2), NEIGHBOURS)
+    return np.asarray(around.max(axis=1))
 
 
 def _mapped(relative: Real) -> Real:

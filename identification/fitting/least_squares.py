@@ -1,60 +1,70 @@
-"""The model's response, its derivatives and the least squares step, compiled: where a fit spends its time."""
+"""The model's response, its derivatives and the least squares step: where a fit spends its time."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg.lapack import dposv
 
 from identification.base.arrays import Complex, Real
-from identification.base.compiled import njit
 from identification.model.structure import Structure
 
 EVALUATIONS = 30
-BLOCK = 32768  # lines whose derivatives are held at a time
+BLOCK = 8192  # lines whose derivatives are held at a time
+MOST_DAMPED = 1e8  # a step beyond it changes nothing
+LEAST_DAMPED = 1e-14
 
 
 def response_of(structure: Structure, theta: Real, omega: Real) -> Complex:
     """|K|/s^q prod(zeros)/prod(poles) exp(-delay s) at s = j omega, (M,)."""
-    return _derive(theta, structure.counts, omega, False)[0]
+    return _response(structure, theta, omega)[0]
 
 
 def log_jacobian(structure: Structure, theta: Real, omega: Real) -> Complex:
     """Derivative of the logarithm of :func:`response_of` with respect to theta, (M, p)."""
-    return _derive(theta, structure.counts, omega, True)[1]
+    return _with_derivatives(structure, theta, omega)[1].T
 
 
-@njit()
-def _derive(theta, counts, omega, derive):  # type: ignore[no-untyped-def]
-    """Response (M,) and, if asked for, the derivative of its logarithm (M, p)."""
-    integrators, left_modes, right_modes, pole_modes, left_rates, right_rates, real_poles = counts
-    zero_modes, real_zeros = left_modes + right_modes, left_rates + right_rates
-    modes, rates = zero_modes + pole_modes, real_zeros + real_poles
-    value = np.empty(omega.size, dtype=np.complex128)
-    logs = np.empty((omega.size if derive else 0, theta.size), dtype=np.complex128)
-    gain, delay = np.exp(theta[0]), theta[-1]
-    natural, damping = np.exp(theta[1 : 1 + 2 * modes : 2]), 2 * np.exp(theta[2 : 2 + 2 * modes : 2])
-    damping[left_modes:zero_modes] *= -1
-    rate = np.exp(theta[1 + 2 * modes : 1 + 2 * modes + rates])
+def _response(structure: Structure, theta: Real, omega: Real) -> tuple[Complex, Complex, Complex]:
+    """Response (M,) and the factors of modes (n, M) and of real roots (k, M), zeros first."""
+    integrators, left_modes, right_modes, pole_modes, left_rates, right_rates, _ = structure.counts
+    zeros, real_zeros = left_modes + right_modes, left_rates + right_rates
+    modes = zeros + pole_modes
+    natural, damping = np.exp(theta[1 : 1 + 2 * modes].reshape(modes, 2).T)[:, :, None]
+    damping[left_modes:zeros] *= -1
+    rate = np.exp(theta[1 + 2 * modes : -1])[:, None]
     rate[left_rates:real_zeros] *= -1
-    for m in range(omega.size):
-        w = omega[m]
-        total = gain * (np.cos(delay * w) - 1j * np.sin(delay * w)) / (1j * w) ** integrators
-        for i in range(modes):
-            x = 1j * w / natural[i]
-            factor = 1 + (damping[i] + x) * x
-            total = total * factor if i < zero_modes else total / factor
-            if derive:
-                inverse = (1.0 if i < zero_modes else -1.0) / factor
-                logs[m, 1 + 2 * i] = -(damping[i] + 2 * x) * x * inverse
-                logs[m, 2 + 2 * i] = damping[i] * x * inverse
-        for i in range(rates):
-            x = 1j * w / rate[i]
-            total = total * (1 + x) if i < real_zeros else total / (1 + x)
-            if derive:
-                logs[m, 1 + 2 * modes + i] = (-1.0 if i < real_zeros else 1.0) * x / (1 + x)
-        if derive:
-            logs[m, 0] = 1.0
-            logs[m, -1] = -1j * w
-        value[m] = total
+    x = omega / natural
+    factors = np.empty((modes, omega.size), dtype=complex)
+    factors.real, factors.imag = 1 - x * x, 2 * damping * x
+    real_factors = np.ones((len(rate), omega.size), dtype=complex)
+    real_factors.imag = omega / rate
+    value = np.exp(theta[0] - 1j * theta[-1] * omega)
+    if integrators:
+        value *= 1j**-integrators * omega ** -float(integrators)
+    for row in (*factors[:zeros], *real_factors[:real_zeros]):
+        value *= row
+    for row in (*factors[zeros:], *real_factors[real_zeros:]):
+        value /= row
+    return value, factors, real_factors
+
+
+def _with_derivatives(structure: Structure, theta: Real, omega: Real) -> tuple[Complex, Complex]:
+    """Response (M,) and the derivative of its logarithm, (p, M)."""
+    value, factors, real_factors = _response(structure, theta, omega)
+    modes, (zeros, _), (real_zeros, _) = len(factors), structure.modes, structure.real
+    logs = np.empty((theta.size, omega.size), dtype=complex)
+    logs[0], logs[-1] = 1.0, -1j * omega
+    of_modes, of_rates = logs[1 : 1 + 2 * modes].reshape(modes, 2, omega.size), logs[1 + 2 * modes : -1]
+    # a factor 1 - x^2 + j d x: its slopes along log omega and log zeta are 2 x^2 - j d x and j d x
+    size = np.square(factors.real) + np.square(factors.imag)
+    damped = factors.imag / size
+    of_modes[:, 1].real, of_modes[:, 1].imag = factors.imag * damped, factors.real * damped
+    twice = (2 - 2 * factors.real) / size
+    of_modes[:, 0].real, of_modes[:, 0].imag = twice * factors.real, -twice * factors.imag
+    of_modes[:, 0] -= of_modes[:, 1]
+    of_rates[...] = 1 / real_factors - 1
+    of_modes[zeros:] *= -1
+    of_rates[real_zeros:] *= -1
     return value, logs
 
 
@@ -68,10 +78,36 @@ def information(structure: Structure, theta: Real, omega: Real, sigma: Real) -> 
     total = np.zeros((structure.size, structure.size))
     for first in range(0, omega.size, BLOCK):
         part = slice(first, first + BLOCK)
-        model = response_of(structure, theta, omega[part]) / sigma[part]
-        rows = stacked(model[:, None] * log_jacobian(structure, theta, omega[part]))
+        value, logs = _with_derivatives(structure, theta, omega[part])
+        rows = (value / sigma[part] * logs).view(float)
         total += rows @ rows.T
     return total
+
+
+def normal_equations(
+    structure: Structure, theta: Real, omega: Real, response: Complex, sigma: Real, *, soft: bool
+) -> tuple[float, Real, Real]:
+    """Cost of the residuals (model - response)/sigma, its half slope (p,) and Gauss and Newton's curvature (p, p).
+
+    Parameters are those of :func:`least_squares`.
+    """
+    cost, slope, curvature = 0.0, np.zeros(theta.size), np.zeros((theta.size, theta.size))
+    for first in range(0, omega.size, BLOCK):
+        part = slice(first, first + BLOCK)
+        value, logs = _with_derivatives(structure, theta, omega[part])
+        rows = (value / sigma[part] * logs).view(float)
+        residual = ((value - response[part]) / sigma[part]).view(float)
+        weighted = rows
+        if soft:
+            square = np.square(residual).reshape(-1, 2).sum(axis=1)
+            root = np.sqrt(1 + square)
+            cost += float(np.sum(2 * square / (1 + root)))  # 2 (root - 1)
+            weighted = rows / np.repeat(root, 2)
+        else:
+            cost += float(residual @ residual)
+        slope += weighted @ residual
+        curvature += weighted @ rows.T
+    return cost, slope, curvature
 
 
 def least_squares(
@@ -87,107 +123,54 @@ def least_squares(
 ) -> Real:
     """The theta (p,) within bounds of least (soft) squares of (model - response)/sigma, from ``theta``.
 
-    ``tolerance`` is the relative change of the cost at which the search ends.
+    Parameters
+    ----------
+    structure
+        Of the model.
+    theta
+        (p,) where to start, within ``bounds``.
+    omega, response, sigma
+        (M,) frequencies, response and the standard deviation of its error.
+    bounds
+        Least and largest theta, (p,) each.
+    soft
+        Soft-L1 loss instead of least squares.
+    tolerance
+        The relative change of the cost at which the search ends.
+
+    Notes
+    -----
+    Levenberg and Marquardt's method; a parameter at its bound stays there while the slope pushes it out. The normal
+    equations of a few scaled parameters are solved: singular values of 2M rows, as scipy.optimize.least_squares takes
+    them, cost ten times the rest.
     """
-    return np.asarray(_least_squares(theta, structure.counts, omega, response, sigma, *bounds, soft, tolerance))
-
-
-@njit()
-def _normal_at(theta, counts, omega, response, sigma, soft):  # type: ignore[no-untyped-def]
-    """What :func:`_normal` gives at theta, BLOCK lines at a time."""
-    cost, slope, curvature = 0.0, np.zeros(theta.size), np.zeros((theta.size, theta.size))
-    for first in range(0, omega.size, BLOCK):
-        last = first + BLOCK
-        value, logs = _derive(theta, counts, omega[first:last], True)
-        more = _normal(value, logs, response[first:last], sigma[first:last], soft)
-        cost, slope, curvature = cost + more[0], slope + more[1], curvature + more[2]
-    return cost, slope, curvature
-
-
-@njit()
-def _normal(value, logs, response, sigma, soft):  # type: ignore[no-untyped-def]
-    """Cost of the residuals (value - response)/sigma, its half slope (p,) and Gauss and Newton's curvature (p, p)."""
-    size = logs.shape[1]
-    cost, slope, curvature = 0.0, np.zeros(size), np.zeros((size, size))
-    row = np.empty(size, dtype=np.complex128)
-    for m in range(value.size):
-        residual = (value[m] - response[m]) / sigma[m]
-        square = residual.real**2 + residual.imag**2
-        root = np.sqrt(1 + square)
-        cost += 2 * square / (1 + root) if soft else square  # 2 (root - 1)
-        weight = 1 / root if soft else 1.0
-        scaled = value[m] / sigma[m]
-        for i in range(size):
-            row[i] = scaled * logs[m, i]
-            slope[i] += weight * (residual.real * row[i].real + residual.imag * row[i].imag)
-            for j in range(i + 1):
-                curvature[i, j] += weight * (row[i].real * row[j].real + row[i].imag * row[j].imag)
-    for i in range(size):
-        for j in range(i):
-            curvature[j, i] = curvature[i, j]
-    return cost, slope, curvature
-
-
-@njit()
-def _solve(matrix, shift, right):  # type: ignore[no-untyped-def]
-    """Solution of (matrix + shift I) x = right by Cholesky's factors; False when it is not positive definite."""
-    size = right.size
-    factor, x = np.zeros((size, size)), right.copy()
-    for i in range(size):
-        for j in range(i + 1):
-            left = matrix[i, j] + (shift if i == j else 0.0)
-            for k in range(j):
-                left -= factor[i, k] * factor[j, k]
-            if i > j:
-                factor[i, j] = left / factor[j, j]
-            elif left > 0:
-                factor[i, i] = np.sqrt(left)
-            else:
-                return False, x
-        for k in range(i):
-            x[i] -= factor[i, k] * x[k]
-        x[i] /= factor[i, i]
-    for i in range(size - 1, -1, -1):
-        for k in range(i + 1, size):
-            x[i] -= factor[k, i] * x[k]
-        x[i] /= factor[i, i]
-    return True, x
-
-
-@njit()
-def _least_squares(theta, counts, omega, response, sigma, lower, upper, soft, tolerance):  # type: ignore[no-untyped-def]
-    """Levenberg and Marquardt's method; a parameter at its bound stays there while the slope pushes it out.
-
-    The normal equations of a few scaled parameters are solved: singular values of 2M rows, as
-    scipy.optimize.least_squares takes them, cost ten times the rest.
-    """
-    cost, slope, curvature = _normal_at(theta, counts, omega, response, sigma, soft)
+    lower, upper = bounds
+    cost, slope, curvature = normal_equations(structure, theta, omega, response, sigma, soft=soft)
     damping, scale = 1e-3, np.zeros(theta.size)
     for _ in range(EVALUATIONS):
-        scale = np.maximum(scale, np.diag(curvature))
-        inside = ((theta > lower) | (slope < 0)) & ((theta < upper) | (slope > 0)) & (scale > 0)
-        free = np.flatnonzero(inside)
+        scale = np.maximum(scale, curvature.diagonal())
+        free = np.flatnonzero(((theta > lower) | (slope < 0)) & ((theta < upper) | (slope > 0)) & (scale > 0))
+        if not free.size:
+            break
         unit = np.sqrt(scale[free])
-        scaled = np.empty((free.size, free.size))
-        for i in range(free.size):
-            for j in range(free.size):
-                scaled[i, j] = curvature[free[i], free[j]] / (unit[i] * unit[j])
-        downhill = -slope[free] / unit
+        scaled = curvature[free][:, free] / unit / unit[:, None]
         while True:
-            solved, step = _solve(scaled, damping, downhill)
+            damped = scaled.copy()
+            damped.flat[:: free.size + 1] += damping
+            _, step, failed = dposv(damped, -slope[free] / unit)
             moved = theta.copy()
-            if solved:
+            if not failed:
                 moved[free] += step / unit
-            moved = np.minimum(np.maximum(moved, lower), upper)
-            reached, moved_slope, moved_curvature = _normal_at(moved, counts, omega, response, sigma, soft)
-            if solved and reached < cost:
-                break
+                moved = np.minimum(np.maximum(moved, lower), upper)
+                reached, *there = normal_equations(structure, moved, omega, response, sigma, soft=soft)
+                if reached < cost:
+                    break
             damping *= 8
-            if damping > 1e8:
+            if damping > MOST_DAMPED:
                 return theta
         gained, cost, theta = cost - reached, reached, moved
-        slope, curvature = moved_slope, moved_curvature
-        damping = max(damping / 8, 1e-14)
+        slope, curvature = there
+        damping = max(damping / 8, LEAST_DAMPED)
         if gained <= tolerance * cost:
             break
     return theta

@@ -19,6 +19,7 @@ RATIOS = 20.0  # of floor and relative error at the median response: logarithm o
 GAIN = 20.0  # the gain is sought up to this factor's logarithm from the one that fits the guess
 CLOSEST = 1e-8  # no relative error below this is believed: files do not carry more digits
 NEWTON = 12  # steps for the scale of soft-L1 errors
+CONVERGED = 1e-8  # relative change of that scale, whose square is the next one's
 HELD = 500_000  # numbers of the grid's lines at a time
 
 
@@ -102,10 +103,13 @@ def _soft_factor(scaled: Real, factor: Real, least: float) -> Real:
     """Zero of mean(z/sqrt(1 + z)) - 1, z = scaled/factor, by Newton's method in log factor, row by row."""
     for _ in range(NEWTON):
         z = scaled / factor[:, None]
-        excess = np.mean(z / np.sqrt(1 + z), axis=1) - 1
-        slope = np.mean(z * (1 + z / 2) / (1 + z) ** 1.5, axis=1)
+        share = z / np.sqrt(1 + z)
+        excess = share.mean(axis=1) - 1
+        slope = (share * (0.5 + 0.5 / (1 + z))).mean(axis=1)
         step = np.clip(excess / np.maximum(slope, np.finfo(float).tiny), -1.0, 1.0)
         factor = np.maximum(factor * np.exp(step), least)
+        if np.max(np.abs(step)) < CONVERGED:
+            break
     return factor
 
 
@@ -152,11 +156,11 @@ def maximise(
     theta, sign = _with_gain(omega, response, sigma, structure, theta)
     lower, upper = _bounds(omega, structure, theta)
     best: Likely | None = None
+    theta = np.clip(theta, lower, upper)
+    response = lines.response - lines.aliases(structure, theta, sign)
     for _ in range(ALTERNATIONS if lines.held_s is None else ALIAS_TURNS):
-        start = np.clip(theta, lower, upper)
-        response = lines.response - lines.aliases(structure, start, sign)
         theta = least_squares(
-            structure, start, omega, sign * response, sigma, (lower, upper), soft=soft, tolerance=tolerance
+            structure, theta, omega, sign * response, sigma, (lower, upper), soft=soft, tolerance=tolerance
         )
         model = response_of(structure, theta, omega)
         response = lines.response - lines.aliases(structure, theta, sign)

@@ -9,7 +9,7 @@ import numpy as np
 from identification.base.arrays import Complex
 from identification.base.errors import InputError
 from identification.fitting.first_guess import unstable_poles
-from identification.fitting.fit_plant import fit_plant
+from identification.fitting.fit_plant import FitResult, fit_plant
 from identification.fitting.grouped_lines import grouped
 from identification.fitting.single_test_fit import ScaledTest
 from identification.model.structure import Structure, Wanted
@@ -27,10 +27,10 @@ RICHEST = Structure(0, 6, 6)  # that is looked at for unstable poles
 SIMPLER = tuple(Structure(0, zeros, n) for n in range(5) for zeros in sorted({0, n}))
 
 
-def fits_reversed(
-    tests: Sequence[FrequencyResponse], wanted: Wanted, distance: float, deviance: float, *, soft: bool
-) -> bool:
-    """Whether the conjugate of the first test fits far better than the test itself, at a median ``distance``.
+def reversed_fit(
+    tests: Sequence[FrequencyResponse], wanted: Wanted, distance: float, deviance: float, *, soft: bool, seed: int
+) -> FitResult | None:
+    """The fit of the first test's conjugate, if that is far better than the test's own, at a median ``distance``.
 
     Far better is BETTER times nearer, or nearer and likelier by a deviance of DECISIVE a line than the test's own.
 
@@ -38,14 +38,14 @@ def fits_reversed(
     as near and simpler. Responses of raw records are never reversed, and are not tried.
     """
     if distance < SUSPECT or any(test.record is not None for test in tests):
-        return False
+        return None
     turned = conjugated(tests[0])
     if _with_unstable_poles(turned, RICHEST)[0] > distance:
-        return False
+        return None
     try:
-        result = fit_plant([turned], wanted, soft=soft)
+        result = fit_plant([turned], wanted, soft=soft, seed=seed)
     except InputError:
-        return False
+        return None
     found = result.tests[0].distance
     unstable, poles, structure = _with_unstable_poles(tests[0], result.structure)
     _, its_poles, its_structure = _with_unstable_poles(turned, result.structure)
@@ -53,18 +53,18 @@ def fits_reversed(
     is_stable = not poles.size or ALIKE * found < unstable or (found < ALIKE * unstable and simpler)
     likelier = result.tests[0].deviance + DECISIVE * result.tests[0].lines < deviance
     is_nearer = BETTER * found < distance or (found < distance and likelier)
-    return is_nearer and found < LIKELY and is_stable
+    return result if is_nearer and found < LIKELY and is_stable else None
 
 
-def has_outliers(test: FrequencyResponse, wanted: Wanted, distance: float) -> bool:
-    """Whether a fit that single lines hardly move is far nearer to most lines than least squares, at ``distance``."""
+def robust_fit(test: FrequencyResponse, wanted: Wanted, distance: float, *, seed: int) -> FitResult | None:
+    """The fit that single lines hardly move, if it is far nearer to most lines than least squares, at ``distance``."""
     if distance < SUSPECT or test.omega.size < FEWEST:
-        return False
+        return None
     try:
-        result = fit_plant([test], wanted, soft=True)
+        result = fit_plant([test], wanted, soft=True, seed=seed)
     except InputError:
-        return False
-    return ROBUST * result.tests[0].distance < distance
+        return None
+    return result if ROBUST * result.tests[0].distance < distance else None
 
 
 def refuse_unstable(test: FrequencyResponse, structure: Structure | None, distance: float) -> None:
@@ -102,7 +102,7 @@ def _with_unstable_poles(test: FrequencyResponse, structure: Structure) -> tuple
     response = scaled.lines.response
     sigma = np.asarray(np.sqrt(np.abs(response) ** 2 * scaled.lines.excitation))
     every = [each for each in (*SIMPLER, structure, RICHEST) if NUMBERS * each.free < 2 * scaled.omega.size]
-    tried = [(*unstable_poles(scaled.omega, response, sigma, each), each) for each in every]
+    tried = [(*unstable_poles(scaled.omega, response, sigma, scaled.likely_delays, each), each) for each in every]
     nearest = min(found for found, _, _ in tried)
     found, poles, which = next(each for each in tried if each[0] <= ALIKE * nearest)
     return found, poles[(np.abs(poles) > scaled.omega[0]) & (np.abs(poles) < scaled.omega[-1])] * scaled.centre, which

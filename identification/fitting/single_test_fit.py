@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
-from identification.fitting.dead_time import MORE_TURNS, same_turn, tells_turns, turn_of
+from identification.fitting.dead_time import MORE_TURNS, likely_delays, same_turn, tells_turns, turn_of
 from identification.fitting.first_guess import guesses
 from identification.fitting.least_squares import information, response_of
 from identification.fitting.likelihood import Likely, Lines, maximise
@@ -52,6 +53,11 @@ class ScaledTest:
         held_s = test.record.sampling_s * self.centre if test.record is not None and test.record.held else None
         self.lines = Lines(self.omega, test.response / self.level, excitation, held_s)
 
+    @cached_property
+    def likely_delays(self) -> Real:
+        """The dead times, in units of its own, near one of which that of the test lies."""
+        return likely_delays(self.omega, self.lines.response)
+
     def fit(self, structure: Structure, simpler: Likely | None, to_beat: float) -> Likely:
         """The likeliest of several guesses, which may build on a fit with one zero mode and pole mode less.
 
@@ -76,7 +82,7 @@ class ScaledTest:
         response = self.lines.response if simpler is None else self._response(simpler)
         for floor in FIRST_FLOORS:
             sigma = np.asarray(np.sqrt((np.abs(response) ** 2 + floor**2) * self.lines.excitation))
-            for guess in guesses(self.omega, response, sigma, structure, GUESSES):
+            for guess in guesses(self.omega, response, sigma, self.likely_delays, structure, GUESSES):
                 yield guess, sigma
                 if more:
                     yield more.pop(0)

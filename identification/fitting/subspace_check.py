@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import eigvals
-from scipy.signal import resample_poly
 
 from identification.base.arrays import Complex, Real
 from identification.model.modes import Mode
@@ -104,6 +103,8 @@ def check_modes(plant: PlantModel, record: Record, band_omega: tuple[float, floa
 
 def _decimated(x: Real, factor: int, differences: int) -> Real:
     """Decimated without phase, and differenced."""
+    from scipy.signal import resample_poly  # most of a second, and only raw records need it
+
     slow = resample_poly(x, 1, factor, padtype="line") if factor > 1 else x
     return np.asarray(np.diff(slow, n=differences))
 

@@ -16,9 +16,6 @@ from identification.model.python_control import from_control, lowest, to_control
 if TYPE_CHECKING:
     from control import TransferFunction
 
-HIGHEST_ORDER = 8
-"""Most poles of an additive bound that is fitted."""
-
 
 @dataclass(frozen=True)
 class AdditiveBound:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import stdtrit
 
 from identification.base.arrays import Complex, Real
 from identification.base.errors import InputError
@@ -48,6 +47,7 @@ class Covariance:
 
         The distribution is Student's since noise and scatter are estimated.
         """
+        from scipy.special import stdtrit  # as long to import as all that a model needs otherwise
 
         def errors(covariance: Matrix) -> Real:
             at = np.asarray(rows, dtype=float)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -88,26 +89,26 @@ class Structure:
         """Of the left zeros, of the right zeros and of the poles."""
         return self.zeros, self.right, self.poles
 
-    @property
+    @cached_property
     def sides(self) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
         """Modes and real roots of the left zeros, of the right zeros and of the poles."""
         of_each = zip(self.degrees, self.real_pairs, strict=True)
         counts = [(degree // 2 - pairs, degree % 2 + 2 * pairs) for degree, pairs in of_each]
         return counts[0], counts[1], counts[2]
 
-    @property
+    @cached_property
     def modes(self) -> tuple[int, int]:
         """Numbers of zero modes and of pole modes."""
         left, right, poles = (modes for modes, _ in self.sides)
         return left + right, poles
 
-    @property
+    @cached_property
     def real(self) -> tuple[int, int]:
         """Numbers of real zeros and of real poles."""
         left, right, poles = (rates for _, rates in self.sides)
         return left + right, poles
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Length of theta."""
         return self.zeros + self.right + self.poles + 2
@@ -132,12 +133,12 @@ class Structure:
         words = [f"{n} {name}{'s' if n > 1 else ''}" for name, n in counts.items() if n] or ["a gain"]
         return ", ".join([*words, *([] if self.delayed else ["no dead time"])])
 
-    @property
+    @cached_property
     def counts(self) -> tuple[int, ...]:
         """Integrators, then the lengths of :attr:`parts`: modes and real roots of left zeros, right zeros and poles."""
         return (self.integrators, *(modes for modes, _ in self.sides), *(rates for _, rates in self.sides))
 
-    @property
+    @cached_property
     def parts(self) -> tuple[slice, ...]:
         """Where theta holds the modes of left zeros, right zeros and poles, then the real roots of the same."""
         ends = np.cumsum([1, *(2 * modes for modes in self.counts[1:4]), *self.counts[4:]])

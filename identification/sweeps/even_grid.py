@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from identification.base.arrays import Real
 from identification.base.digits import showing_difference
@@ -71,6 +70,8 @@ def on_even_grid(table: Table, *, resample: bool) -> tuple[Table, float]:
 
 
 def _resampled(table: Table, usual: float) -> tuple[Table, float]:
+    from scipy.interpolate import CubicSpline  # a tenth of a second, and only uneven records need it
+
     time_s = table.columns["time_s"]
     steps = np.diff(time_s)
     intervals = float(np.sum(np.maximum(np.rint(steps / usual), 1)))

@@ -4,47 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 
-from identification.base.errors import InputError, printable
-from identification.base.files import is_folder, require_readable, true_path
+import numpy as np
+
+from identification.base.errors import printable
+from identification.base.files import require_readable
+from identification.formats.columns import Table
 from identification.formats.csv_file import read_csv
 from identification.formats.first_bytes import usual_suffix
-from identification.formats.mat_file import read_mat
 from identification.formats.reading import Reading
 from identification.formats.uff_file import read_uff
 from identification.sweeps.from_table import from_record, from_response
+from identification.sweeps.input_files import CSV, MAT, UFF, input_files
 from identification.sweeps.kept_responses import read_responses
 from identification.sweeps.response import FrequencyResponse
 
 KEPT = ".npz"
-READERS = {
-    **dict.fromkeys((".csv", ".tsv", ".lvm"), read_csv),
-    ".mat": read_mat,
-    **dict.fromkeys((".uff", ".unv", ".ufb", ".58"), read_uff),
-}
 
 
-def input_files(paths: Sequence[Path | str]) -> list[Path]:
-    """The files that a list of files and folders means, in its order.
+def _read_mat(path: Path, reading: Reading) -> list[Table]:
+    from identification.formats.mat_file import read_mat  # h5py and scipy.io take a tenth of a second
 
-    A folder means the files in it that end as READERS says, sorted by name; hidden ones and folders within are left
-    out.
+    return read_mat(path, reading)
 
-    Raises
-    ------
-    InputError
-        A folder holds no such file or may not be read, or a file is given twice.
-    """
-    files: list[Path] = []
-    for path in map(Path, paths):
-        files += _files_in(path) if is_folder(path) else [path]
-    met = set()
-    for file in files:
-        if (goal := true_path(file)) in met:
-            raise InputError(f"{file}: is given twice; expected each file once")
-        met.add(goal)
-    return files
+
+READERS = {**dict.fromkeys(CSV, read_csv), **dict.fromkeys(MAT, _read_mat), **dict.fromkeys(UFF, read_uff)}
 
 
 def read_sweeps(paths: Path | str | Sequence[Path | str], reading: Reading | None = None) -> list[FrequencyResponse]:
@@ -91,30 +77,16 @@ def read_sweeps(paths: Path | str | Sequence[Path | str], reading: Reading | Non
 
 def _without_copies(tests: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
     """The tests without those that are another bit for bit: no two measurements have the same noise."""
-    kept: dict[tuple[bytes, bytes], FrequencyResponse] = {}
+    kept: dict[bytes, FrequencyResponse] = {}
     for test in tests:
-        content = (test.omega.tobytes(), test.response.tobytes())
-        if (first := kept.get(content)) is None:
-            kept[content] = test
+        content = sha256(np.ascontiguousarray(test.omega).data)
+        content.update(np.ascontiguousarray(test.response).data)
+        if (first := kept.get(content.digest())) is None:
+            kept[content.digest()] = test
         else:
             remark = f"{test.name} is the same measurement and was left out"
-            kept[content] = replace(first, remarks=(*first.remarks, remark))
+            kept[content.digest()] = replace(first, remarks=(*first.remarks, remark))
     return list(kept.values())
-
-
-def _files_in(folder: Path) -> list[Path]:
-    try:
-        entries = sorted(folder.iterdir())
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be read ({error.strerror})") from None
-    files = [
-        entry
-        for entry in entries
-        if entry.suffix.lower() in READERS and not entry.name.startswith(".") and not is_folder(entry)
-    ]
-    if not files:
-        raise InputError(f"{folder}: holds no file that ends in {', '.join(READERS)}; expected one or more")
-    return files
 
 
 def _names(files: Sequence[Path]) -> list[str]:

@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pandas as pd
 
-from experiments.engine.simulate import limits_text
-from experiments.runs.guarantee import sector_text
 from experiments.runs.metrics import settling_time
+from experiments.runs.words import limits_text, sector_text
 from identification.base.digits import lower_end, told_apart, upper_end
 from identification.base.errors import InputError
 

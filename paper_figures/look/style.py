@@ -114,25 +114,35 @@ def rendered(figure: Figure, folder: Path, name: str, caption: str) -> dict[Path
     Parameters
     ----------
     figure
-        The figure; rendered again it gives the same bytes.
+        The figure, which is laid out once, so that the three files show it alike; rendered again it gives the same
+        bytes.
     folder, name
         Where the files shall lie, and their name without suffix.
     caption
         The caption, paragraphs of printable text.
     """
     files = {folder / f"{name}.txt": f"{printable_lines(caption)}\n".encode()}
-    return files | {folder / f"{name}.{kind}": _rendered_as(figure, kind) for kind in _METADATA}
+    _escape(figure)
+    for kind in _METADATA:
+        files[folder / f"{name}.{kind}"] = _rendered_as(figure, kind)
+        with matplotlib.style.context("default"):
+            figure.set_layout_engine()  # none any more
+    return files
 
 
 def figure_writer(figure: Figure) -> Callable[[Path], object]:
     """What writes a figure, as PDF, SVG or PNG by the suffix of the path, the same bytes from run to run."""
+    _escape(figure)
     return lambda path: path.write_bytes(_rendered_as(figure, path.suffix[1:].lower()))
 
 
-def _rendered_as(figure: Figure, kind: str) -> bytes:
+def _escape(figure: Figure) -> None:
     for text in figure.findobj(Text):
         if (escaped := printable_lines(text.get_text())) != text.get_text():
             text.set_text(escaped)
+
+
+def _rendered_as(figure: Figure, kind: str) -> bytes:
     with styled():
         figure.savefig(written := BytesIO(), format=kind, metadata=_METADATA[kind])
     return written.getvalue()

@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,7 @@ INSTALLED = ("antiwindup", "data/thesis", *ROOMS)
 BESIDE = {"antiwindup", "setup.py", "benchmarks", "data", "tests"}
 BY_NAME = {
     "antiwindup/__main__.py",
+    "antiwindup/preloaded.py",
     "experiments/thesis/claims/equations_page.py",
     "experiments/thesis/claims/ledger.py",
     "identification/base/faces.py",
@@ -104,16 +106,17 @@ BY_NAME = {
 """The modules that import what a text names."""
 
 
-def past_the_contracts(tree: Path, file: str) -> list[str]:
+@cache
+def past_the_contracts(file: str, text: str) -> list[str]:
     """What a module does that neither import-linter nor antiwindup/code_files.py sees, for which imports are read."""
-    nodes = list(ast.walk(ast.parse((tree / file).read_text(encoding="utf-8"))))
+    nodes = list(ast.walk(ast.parse(text)))
     documents = {node.value for node in nodes if isinstance(node, ast.Expr)}
     found = []
     for node in nodes:
         if isinstance(node, ast.Import):  # which gives the package, and with it the names of its face
             found += [alias.name for alias in node.names if alias.name.split(".")[0] in ROOMS]
         if isinstance(node, ast.ImportFrom) and (node.module in ROOMS or node.level):
-            wings = {path.stem for path in (tree / str(node.module)).iterdir()} if node.module in ROOMS else set()
+            wings = {path.stem for path in (ROOT / str(node.module)).iterdir()} if node.module in ROOMS else set()
             found += [alias.name for alias in node.names if alias.name not in wings or node.level]
         name = getattr(node, "id", None) or getattr(node, "attr", None) or getattr(node, "name", None)
         if file not in BY_NAME and name in ("import_module", "__import__", "runpy"):
@@ -130,7 +133,8 @@ def past_the_contracts(tree: Path, file: str) -> list[str]:
 def all_past_the_contracts(tree: Path) -> dict[str, list[str]]:
     """That of every module that is installed, and the Python that stands beside the rooms without a place there."""
     paths = [path for place in INSTALLED for path in (tree / place).rglob("*.py")]
-    found = {file: past_the_contracts(tree, file) for file in (path.relative_to(tree).as_posix() for path in paths)}
+    texts = {path.relative_to(tree).as_posix(): path.read_text(encoding="utf-8") for path in paths}
+    found = {file: past_the_contracts(file, text) for file, text in texts.items()}
     others = [path for path in tree.glob("[!.]*") if path.name not in {*ROOMS, *BESIDE, "build"}]
     found |= {path.name: ["has no place"] for path in others if path.suffix == ".py" or any(path.rglob("*.py"))}
     return {file: names for file, names in found.items() if names}

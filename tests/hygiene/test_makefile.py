@@ -44,7 +44,7 @@ NAMES = [
 def make(tmp_path: Path) -> Path:
     """A folder with the Makefile and a stand-in for Python."""
     shutil.copy(ROOT / "Makefile", tmp_path)
-    for name in ("requirements.lock", "pyproject.toml", "requirements-bench.lock", "ready"):
+    for name in ("requirements.lock", "pyproject.toml", "requirements-bench.lock", "ready", ".compiled"):
         (tmp_path / name).touch()
     python = tmp_path / "python"
     python.write_text(PYTHON, encoding="utf-8")
@@ -163,6 +163,20 @@ def test_a_name_with_blanks_that_is_there_needs_no_quotes(tmp_path: Path, monkey
 
 def test_every_target_is_in_the_help() -> None:
     text = run(ROOT, "help").stdout
-    targets = ["help", "figures", "report", "refit", "claims", "test", "bench", "study", "referee", "fuzz", "faults"]
+    targets = [
+        "help",
+        "bench-build",
+        "figures",
+        "report",
+        "refit",
+        "claims",
+        "test",
+        "suite",
+        "bench",
+        "study",
+        "referee",
+        "fuzz",
+        "faults",
+    ]
     targets += ["audit", "lint", "clean"]
     assert all(f"\n{name} " in f"\n{text}" for name in targets)

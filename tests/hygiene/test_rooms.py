@@ -98,40 +98,48 @@ def run(tree: Path, code: str, **environment: str) -> list[str]:
     return done.stdout.split()
 
 
+DIGESTS = """
+import sys
+import experiments.engine.integrator
+from experiments.runs import code_hash
+from identification.base.compiled import code_cache
+for file in (None, None, "experiments/engine/crossings.py", "design/stability/jet.py"):
+    if file:
+        with open(file, "a", encoding="utf-8") as module:
+            module.write("# edited\\n")
+    code_cache.cache_clear()
+    code_hash.code_sha256.cache_clear()
+    print(code_cache("experiments"), code_hash.code_sha256())
+"""
+
+
 def test_an_edit_in_a_wing_changes_what_the_code_is_known_by(tree: Path, tmp_path: Path) -> None:
     """Else a compiled function would run as it was before, and a campaign go on with other code."""
-    code = (
-        "import experiments.campaign.run_plants as r; from identification.base.compiled import code_cache;"
-        "print(code_cache('experiments'), r.code_sha256())"
-    )
-
-    def digests() -> list[str]:
-        return run(tree, code, XDG_CACHE_HOME=str(tmp_path))
-
-    def edited(file: str) -> list[str]:
-        with (tree / file).open("a", encoding="utf-8") as module:
-            module.write("# edited\n")
-        return digests()
-
-    first = digests()
-    assert first == digests()
+    words = iter(run(tree, DIGESTS, XDG_CACHE_HOME=str(tmp_path)))
+    first, again, compiled, other = zip(words, words, strict=True)
+    assert first == again
     assert Path(first[0]).parent == tmp_path / "antiwindup"
-    compiled = edited("experiments/engine/crossings.py")
     assert compiled[0] != first[0]
     assert compiled[1] != first[1]
-    other = edited("design/stability/jet.py")
     assert other[0] == compiled[0]
     assert other[1] != compiled[1]
 
 
-COMPILED = (
-    "import tempfile; tempfile.tempdir = {temporary!r}\n"
-    "import numpy as np\n"
-    "from experiments.engine import crossings\n"
-    "from identification.base.compiled import code_cache\n"
-    "crossings._sign_changes(np.array([1.0, -2.0]))\n"
-    "print(code_cache('experiments'))\n"
-)
+COMPILED = """
+import os, sys, tempfile
+import numpy as np
+from identification.base.compiled import code_cache
+for environment, temporary in {cases!r}:
+    if os.fork():
+        os.wait()
+        continue
+    os.environ.update(environment)
+    tempfile.tempdir = temporary
+    from experiments.engine import crossings
+    crossings._sign_changes(np.array([1.0, -2.0]))
+    print(code_cache("experiments"), flush=True)
+    os._exit(0)
+"""
 
 
 def test_where_compiled_code_is_kept(tree: Path, tmp_path: Path) -> None:
@@ -139,16 +147,17 @@ def test_where_compiled_code_is_kept(tree: Path, tmp_path: Path) -> None:
     users, other, barred = tmp_path / "users", tmp_path / "other", tmp_path / "barred"
     other.mkdir()
     barred.touch()
-    for cache, temporary, expected in (
+    cases = (
         ({"XDG_CACHE_HOME": str(users)}, other, users / "antiwindup"),
         ({"XDG_CACHE_HOME": "", "HOME": str(users)}, other, users / ".cache" / "antiwindup"),
         ({"XDG_CACHE_HOME": str(barred)}, other, other / f"antiwindup-{os.getuid()}"),
         ({"XDG_CACHE_HOME": str(barred)}, barred, None),
         ({"XDG_CACHE_HOME": str(barred), "NUMBA_CACHE_DIR": str(users)}, other, users),
-    ):
-        (found,) = run(tree, COMPILED.format(temporary=str(temporary)), **cache)
-        assert found == "None" if expected is None else Path(found).parent == expected
-        assert expected is None or any(Path(found).glob("*.nbc"))
+    )
+    found = run(tree, COMPILED.format(cases=[(environment, str(temporary)) for environment, temporary, _ in cases]))
+    for folder, (_, _, expected) in zip(found, cases, strict=True):
+        assert folder == "None" if expected is None else Path(folder).parent == expected
+        assert expected is None or any(Path(folder).glob("*.nbc"))
     assert [path for path in tree.rglob("*") if path.suffix in (".nbi", ".nbc")] == []
 
 

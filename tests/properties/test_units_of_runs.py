@@ -26,10 +26,11 @@ from experiments.drive.sampled_loop import Drive, SampledRun, simulate_sampled
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import DivergenceError, Run, simulate
 from experiments.runs.design_loop import design_loop
-from experiments.runs.guarantee import guarantee, sector_text
+from experiments.runs.guarantee import guarantee
 from experiments.runs.references import Reference, SampledReference
 from experiments.runs.sector_promise import judge_run
 from experiments.runs.verdict import Verdict
+from experiments.runs.words import sector_text
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 

@@ -7,6 +7,7 @@ its 1 %. The thesis's reference has a fixed size: where it is run, only the unit
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +18,13 @@ from scipy.signal import chirp, cont2discrete, dlsim
 
 from design.design_file import Design
 from experiments.campaign.draw_plants import PlantsWithin
-from experiments.campaign.run_plants import Campaign, code_sha256, run_chunk
+from experiments.campaign.run_plants import Campaign, run_chunk
 from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies import f_gamma, hidden_modes, interpolation, trade_off
 from experiments.thesis.studies.additive_error import additive_error_tables
 from experiments.thesis.studies.chapter_2 import delay_free_tables
-from experiments.thesis.studies.chapter_4 import desaturation, extended_tables, usual_limit
+from experiments.thesis.studies.chapter_4 import extended_tables, usual_limit
+from experiments.thesis.studies.desaturation import desaturation
 from experiments.thesis.studies.f_gamma import f_gamma_tables
 from experiments.thesis.studies.hidden_modes import hidden_modes_tables
 from experiments.thesis.studies.interpolation import interpolation_tables
@@ -30,11 +32,12 @@ from experiments.thesis.studies.robustness import robustness_tables
 from experiments.thesis.studies.sampled_rates import sampled_rates_tables
 from experiments.thesis.studies.trade_off import trade_off_tables
 from identification.bound.bound_residuals import bound_residuals
-from identification.fitting.fit_plant import fit_plant
+from identification.fitting.fit_plant import FitResult, fit_plant
 from identification.model.additive_bound import AdditiveBound
 from identification.model.model_file import IdentifiedModel
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
+from identification.model.reports import BoundReport
 from identification.model.structure import Wanted
 from identification.output.fit_facts import table as fit_table
 from identification.sweeps.read_sweeps import read_sweeps
@@ -127,8 +130,8 @@ def test_a_campaign(small_designs: dict[str, Design], kind: str, units: Units) -
         design = each.design(small_designs[kind])
         reference = thesis_reference(kind, design.reference_omegas)
         limit = LIMIT * abs(each.input)
-        campaign = Campaign(design, str(each), 1, reference, (-limit, limit), 5, code_sha256())
-        return pd.DataFrame(run_chunk(campaign, 0, 2))
+        campaign = Campaign(design, str(each), 1, reference, (-limit, limit), 5)
+        return pd.DataFrame(run_chunk(campaign, (0, 2)))
 
     found, expected = rows(units), rows(Units())
     assert list(found.pop("plant")) == list(expected.pop("plant")) == [0, 0, 0, 1, 1, 1]
@@ -213,19 +216,21 @@ def measured(plant: PlantModel, units: Units, count: int) -> list[FrequencyRespo
     return tests
 
 
+@cache
+def fitted(units: Units, count: int) -> tuple[FitResult, BoundReport, Tables]:
+    """Of so many tests: the fit, the bound and the table of the errors."""
+    tests = measured(PlantModel(2.0, (Mode(3.0, 0.05),), (Mode(5.0, 0.05),), 0.05), units, count)
+    fit = fit_plant(tests)
+    report = bound_residuals(fit.plant, tests, [test.plant for test in fit.tests], 2)
+    return fit, report, additive_error_tables(IdentifiedModel(fit.plant, report.bound), tests)
+
+
 @pytest.mark.parametrize("count", [1, 2])
 @pytest.mark.parametrize("units", [Units(1e6, 1e6), Units(1e-6, -1e-6), Units(2.0**15, 1.0, 2.0**-19)], ids=str)
 def test_the_fit_and_the_additive_error(units: Units, count: int) -> None:
     """The structure, the plant to 1e-6 (the likelihood is flat to 1e-14 there), and the bound to its 1e-3."""
-    plant = PlantModel(2.0, (Mode(3.0, 0.05),), (Mode(5.0, 0.05),), 0.05)
-    results = []
-    for each in (units, Units()):
-        tests = measured(plant, each, count)
-        fit = fit_plant(tests)
-        report = bound_residuals(fit.plant, tests, [test.plant for test in fit.tests], 2)
-        model = IdentifiedModel(fit.plant, report.bound)
-        results.append((fit, report, additive_error_tables(model, tests)))
-    (found, bound, errors), (expected, usual, usual_errors) = results
+    found, bound, errors = fitted(units, count)
+    expected, usual, usual_errors = fitted(Units(), count)
     assert found.structure == expected.structure
     omega = np.linspace(0.5, 12.0, 60)
     s = 1j * omega / units.time

@@ -11,8 +11,9 @@ import pytest
 from other_units import Units
 
 from design.design_file import Design
-from experiments.runs.guarantee import Guarantee, sector_text
+from experiments.runs.guarantee import Guarantee
 from experiments.runs.verdict import Verdict
+from experiments.runs.words import sector_text
 from experiments.thesis.studies import hidden_modes, interpolation
 from experiments.thesis.studies.chapter_2 import delay_free_tables
 from experiments.thesis.studies.chapter_4 import extended_tables

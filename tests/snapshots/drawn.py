@@ -35,18 +35,26 @@ def drawn(figure: Figure) -> tuple[str, dict[str, np.ndarray]]:
     left_over = [artist for artist in figure.get_children() if artist not in (figure.patch, *figure.axes)]
     assert not left_over, f"beside the axes the figure holds {left_over}"
     for place, axes in enumerate(figure.axes):
-        lines.append(_axes(place, axes))
-        numbers |= {
-            f"{place} place": np.array(axes.get_position().bounds),
-            f"{place} xlim": np.array(axes.get_xlim()),
-            f"{place} ylim": np.array(axes.get_ylim()),
-        }
-        for count, artist in enumerate(artists_of(axes)):
-            listed, coordinates = _artist(artist)
-            lines.append(f"  {count} {type(artist).__name__} {listed} {_shown(artist)}")
-            for name, values in coordinates.items():
-                numbers |= flagged(f"{place} {count} {name}", values)
-    return "\n".join(lines) + "\n", {name: values for name, values in numbers.items() if len(values)}
+        listed, coordinates = drawn_axes(place, axes)
+        lines += listed
+        numbers |= coordinates
+    return "\n".join(lines) + "\n", numbers
+
+
+def drawn_axes(place: int, axes: Axes) -> tuple[list[str], dict[str, np.ndarray]]:
+    """The lines and the columns of one of the axes, whose number is the first word of each column's name."""
+    lines = [_axes(place, axes)]
+    numbers = {
+        f"{place} place": np.array(axes.get_position().bounds),
+        f"{place} xlim": np.array(axes.get_xlim()),
+        f"{place} ylim": np.array(axes.get_ylim()),
+    }
+    for count, artist in enumerate(artists_of(axes)):
+        listed, coordinates = _artist(artist)
+        lines.append(f"  {count} {type(artist).__name__} {listed} {_shown(artist)}")
+        for name, values in coordinates.items():
+            numbers |= flagged(f"{place} {count} {name}", values)
+    return lines, {name: values for name, values in numbers.items() if len(values)}
 
 
 def _shown(artist: Artist) -> str:

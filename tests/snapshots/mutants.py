@@ -15,7 +15,7 @@ import numpy as np
 from strict import RTOL, Stored, is_kept, read_snapshot
 
 SMALL = 1e-6
-SAMPLES = 200
+SAMPLES = 60
 CHOSEN_ROWS = 50
 SEED = 1
 

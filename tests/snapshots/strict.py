@@ -71,7 +71,7 @@ class Stored:
     """
 
     def __init__(self, columns: Columns, name: str = "") -> None:
-        self.columns = dict(columns)
+        self.columns, self.name = dict(columns), name
         for column, want in self.columns.items():
             _require_finite(column, want, "the snapshot")
         real = {column: want for column, want in self.columns.items() if want.dtype.kind == "f"}
@@ -86,10 +86,11 @@ class Stored:
         its column; nothing is absolute, and integers and names are exact.
         """
         assert columns, "there are no columns"
-        for name, values in columns.items():
+        others = {name: values for name, values in columns.items() if values is not self.columns.get(name)}
+        for name, values in others.items():
             _require_real(name, values, "the data")
         assert list(self.columns) == list(columns), f"columns changed from {list(self.columns)} to {list(columns)}"
-        for name, values in columns.items():
+        for name, values in others.items():
             want = self.columns[name]
             assert len(want) == len(values), f"{name}: {len(values)} rows, the snapshot has {len(want)}"
             assert want.dtype.kind == values.dtype.kind, f"{name}: kind {values.dtype}, the snapshot's is {want.dtype}"

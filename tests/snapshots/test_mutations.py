@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn import artists_of, drawn
+from drawn import artists_of, drawn, drawn_axes
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.collections import Collection, QuadMesh
-from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Polygon, Rectangle, StepPatch
@@ -60,18 +60,18 @@ def test_the_same_is_not_caught(path: Path, tmp_path: Path) -> None:
         stored.check({name: values.copy() for name, values in stored.columns.items()})
 
 
-@pytest.fixture(scope="module", params=figure_names())
-def figure(request: pytest.FixtureRequest) -> tuple[Figure, Stored, str]:
-    """A figure of the stored tables, the stored numbers of what it draws, and the stored listing."""
-    listing = (STORED / f"{request.param}.txt").read_text(encoding="utf-8")
-    return draw_stored(request.param), stored_snapshot(STORED / f"{request.param}.npz"), listing
+class Panel:
+    """One of a figure's axes with what is stored of it."""
 
+    def __init__(self, place: int, axes: Axes, stored: Stored) -> None:
+        self.place, self.axes = place, axes
+        own = {name: values for name, values in stored.columns.items() if name.split()[0] == str(place)}
+        self.stored, self.lines = Stored(own, stored.name), drawn_axes(place, axes)[0]
 
-def is_noticed(figure: tuple[Figure, Stored, str]) -> bool:
-    """Whether the figure as it is now is refused."""
-    drawing, stored, wanted = figure
-    listing, columns = drawn(drawing)
-    return listing != wanted or is_caught(stored, columns)
+    def is_noticed(self) -> bool:
+        """Whether the axes as they are now are refused."""
+        lines, columns = drawn_axes(self.place, self.axes)
+        return lines != self.lines or is_caught(self.stored, columns)
 
 
 def moved(artist: Artist) -> Iterator[Callable[[float], object]]:
@@ -112,37 +112,43 @@ def moved(artist: Artist) -> Iterator[Callable[[float], object]]:
         assert isinstance(artist, Legend), artist
 
 
-def test_every_change_of_a_drawing_is_caught(figure: tuple[Figure, Stored, str]) -> None:
+@pytest.mark.parametrize("name", figure_names())
+def test_every_change_of_a_drawing_is_caught(name: str) -> None:
     """Each artist shifted by 1e-6 relative, hidden, made pale, each view shifted, each name changed, one taken away."""
-    drawing = figure[0]
-    assert not is_noticed(figure)
-    for axes in drawing.axes:
+    drawing, stored = draw_stored(name), stored_snapshot(STORED / f"{name}.npz")
+    listing, columns = drawn(drawing)
+    assert listing == (STORED / f"{name}.txt").read_text(encoding="utf-8")
+    assert not is_caught(stored, columns)
+    panels = [Panel(place, axes, stored) for place, axes in enumerate(drawing.axes)]
+    assert "".join(f"{line}\n" for panel in panels for line in panel.lines) == listing
+    for panel in panels:
+        axes = panel.axes
         for artist in artists_of(axes):
             for move in moved(artist):
                 move(LARGER)
-                assert is_noticed(figure), f"{artist} shifted"
+                assert panel.is_noticed(), f"{artist} shifted"
                 move(1.0)
             artist.set_visible(False)
-            assert is_noticed(figure), f"{artist} hidden"
+            assert panel.is_noticed(), f"{artist} hidden"
             artist.set_visible(True)
             if not isinstance(artist, Patch):  # whose faces and edges do not come back
                 alpha = artist.get_alpha()
                 artist.set_alpha(0.05)
-                assert is_noticed(figure), f"{artist} pale"
+                assert panel.is_noticed(), f"{artist} pale"
                 artist.set_alpha(alpha)
-            assert not is_noticed(figure), f"{artist} restored"
+            assert not panel.is_noticed(), f"{artist} restored"
         for ends, set_ends in ((axes.get_xlim(), axes.set_xlim), (axes.get_ylim(), axes.set_ylim)):
             set_ends(ends[0], ends[1] * LARGER)
-            assert is_noticed(figure), f"{axes} with another view"
+            assert panel.is_noticed(), f"{axes} with another view"
             set_ends(*ends)
         axes.set_visible(False)
-        assert is_noticed(figure), f"{axes} hidden"
+        assert panel.is_noticed(), f"{axes} hidden"
         axes.set_visible(True)
         label = axes.get_ylabel()
         axes.set_ylabel(f"{label}.")
-        assert is_noticed(figure), f"{axes} with another label"
+        assert panel.is_noticed(), f"{axes} with another label"
         axes.set_ylabel(label)
-    assert not is_noticed(figure)
-    first = next(artists_of(drawing.axes[0]))
+    assert not any(panel.is_noticed() for panel in panels)
+    first = next(artists_of(panels[0].axes))
     first.remove()
-    assert is_noticed(figure), f"{first} taken away"
+    assert panels[0].is_noticed(), f"{first} taken away"

@@ -6,8 +6,8 @@ Chebyshev's points tau in [-1, 1]:
 
     X = 1 x(a)' + length/2 J (X M' + W N' + 1 f'),        J = the integral of the interpolant from -1 to every node,
 
-one dense linear system for all nodes and states. With Schur's form of the balanced M it falls into one system of the
-size of J for each state. The delayed signals W are read off the interpolants of earlier intervals.
+one linear system for all nodes and states: Sylvester's equation, solved with Schur's forms of the balanced M and of J's
+inverse. The delayed signals W are read off the interpolants of earlier intervals.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 from scipy.linalg import matrix_balance, schur
+from scipy.linalg.lapack import ztrsyl
 from scipy.optimize import brentq
 
 from experiments.engine.saturated_loop import SaturatedLoop
@@ -44,6 +45,7 @@ class _Basis:
         self.coefficients = np.linalg.inv(chebyshev.chebvander(self.nodes, count - 1))
         integrals = np.stack([chebyshev.chebint(row, lbnd=-1) for row in np.eye(count)], axis=1)
         self.J = chebyshev.chebvander(self.nodes, count) @ integrals @ self.coefficients
+        self.slopes, self.turned = schur(np.linalg.inv(self.J[1:, 1:]), output="complex")
         self.fine = np.cos(np.pi * np.arange(4 * count, -1, -1) / (4 * count))
         self.to_fine = self.at(self.fine) @ self.coefficients
 
@@ -92,33 +94,23 @@ class _Linear:
         balanced, (self.scale, _) = matrix_balance(M, permute=False, separate=True)
         self.T, self.Q = schur(balanced, output="complex")
         self.M, self.basis = M, basis
-        self.kept: dict[int, Array] = {}
-
-    def _inverses(self, length: float) -> Array:
-        """(1 - length/2 T_ii J)^-1 for every i, shape (n, count, count); kept for equal lengths."""
-        key = round(length * 2**48)  # the same but for the rounding of time itself
-        if key not in self.kept:
-            if len(self.kept) > 64:
-                self.kept.clear()
-            step = length / 2 * self.basis.J
-            self.kept[key] = np.linalg.inv(np.eye(self.basis.count) - np.diag(self.T)[:, None, None] * step)
-        return self.kept[key]
 
     def solve(self, length: float, start: Array, forcing: Array) -> Array:
         """States (count, n) at the nodes, from the start (n,) and the forcing (count, n)."""
-        step, inverses = length / 2 * self.basis.J, self._inverses(length)
+        step = length / 2 * self.basis.J
         right = start + step @ forcing
-        states = self._solve(step, inverses, right)
+        states = self._solve(length / 2, right)
         # Schur's coordinates mix states of all sizes: once more, for what is left in the states' own coordinates
-        return states + self._solve(step, inverses, right - states + step @ (states @ self.M.T))
+        return states + self._solve(length / 2, right - states + step @ (states @ self.M.T))
 
-    def _solve(self, step: Array, inverses: Array, right: Array) -> Array:
-        """X of X - step X M' = right."""
-        known = ((right / self.scale) @ self.Q.conj()).T
-        z = np.empty_like(known)
-        for i in range(len(z) - 1, -1, -1):
-            z[i] = inverses[i] @ (known[i] + step @ (self.T[i, i + 1 :] @ z[i + 1 :]))
-        return np.asarray((z.T @ self.Q.T).real * self.scale)
+    def _solve(self, half: float, right: Array) -> Array:
+        """X of X - half J X M' = right: Sylvester's equation for all nodes but the first, at which J is 0."""
+        z = (right / self.scale) @ self.Q.conj()
+        first = np.outer(self.basis.J[1:, 0], self.T @ z[0])
+        known = self.basis.slopes @ (self.basis.turned.conj().T @ (z[1:] / half + first))
+        found, scale, _ = ztrsyl(self.basis.slopes / half, self.T.conj(), known, tranb="C", isgn=-1)
+        z[1:] = self.basis.turned @ found / scale
+        return np.asarray((z @ self.Q.T).real * self.scale)
 
 
 class _History:

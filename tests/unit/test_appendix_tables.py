@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from design.anti_windup.judge import judge
@@ -52,10 +53,14 @@ def test_trade_off_of_another_plant(
     assert np.isnan(summary.loc["thesis", "popov_sector"])
 
 
-def test_where_the_designs_of_q_work(extended_design: Design) -> None:
+@pytest.fixture(scope="module")
+def interpolation(extended_design: Design) -> dict[str, pd.DataFrame]:
+    return interpolation_tables(extended_design)
+
+
+def test_where_the_designs_of_q_work(interpolation: dict[str, pd.DataFrame]) -> None:
     """The thesis: Lagrange fails at high frequency, designing the poles works only there."""
-    tables = interpolation_tables(extended_design)
-    table, ranges = tables["interpolation"], tables["interpolation_summary"]
+    table, ranges = interpolation["interpolation"], interpolation["interpolation_summary"]
     lagrange = table[table["method"] == "lagrange"]
     assert lagrange["works"][lagrange["omega"] < 4].all()
     assert not lagrange["works"][lagrange["omega"] > 8].any()
@@ -74,7 +79,7 @@ def test_where_the_designs_of_q_work(extended_design: Design) -> None:
     ) == len(working)
 
 
-def test_the_map_holds_for_every_time_scale(other_design: Design, extended_design: Design) -> None:
+def test_the_map_holds_for_every_time_scale(other_design: Design, interpolation: dict[str, pd.DataFrame]) -> None:
     """Whether the poles design is stable depends on omega T_d and a T_d only."""
     tables = interpolation_tables(other_design)
     table, grid = tables["interpolation"], tables["interpolation_map"]
@@ -85,7 +90,7 @@ def test_the_map_holds_for_every_time_scale(other_design: Design, extended_desig
     inside = poles["omega"].between(0.1 / OTHER.delay_s, 10 / OTHER.delay_s)
     read = np.interp(np.log(poles["omega"][inside] * OTHER.delay_s), np.log(row["omega_delay"]), row["stable"])
     assert np.mean((read > 0.5) == (poles["stable"][inside] == 1)) > 0.95
-    np.testing.assert_array_equal(grid, interpolation_tables(extended_design)["interpolation_map"])
+    np.testing.assert_array_equal(grid, interpolation["interpolation_map"])
 
 
 def test_a_delay_free_design_has_no_q(delay_free_design: Design) -> None:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+import pickle
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from design.design_file import Design
 from experiments.engine.simulate import DivergenceError, simulate
+from experiments.runs import batch
 from experiments.runs.batch import IN_FLIGHT, simulate_many
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import SampledReference, sinusoid
@@ -85,3 +88,19 @@ def test_bad_arguments_are_refused_at_once(
 ) -> None:
     with pytest.raises(InputError, match=message):
         simulate_many(extended_design, [], REFERENCES, {"none": None}, limits, TIMES, workers)
+
+
+def test_a_cluster_gets_few_pieces_and_gives_the_results_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    pieces: list[int] = []
+
+    def sent(
+        work: Callable[[Any], Any], items: Sequence[Any], scheduler: str, tick: Callable[[], object]
+    ) -> list[object]:
+        pieces.append(len(items))
+        there, received = pickle.loads(pickle.dumps((work, items)))
+        return [there(item) for item in received]
+
+    monkeypatch.setattr(batch, "gathered", sent)
+    for count in (0, 1, 128, 1000):
+        assert batch.on_cluster(abs, [-k for k in range(count)], "tcp://there:8786") == list(range(count))
+    assert pieces == [0, 1, 128, 125]

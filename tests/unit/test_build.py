@@ -81,6 +81,8 @@ def refit(
         return StandIn(step, log, journal, behaviour.get(step.name, ""))
 
     monkeypatch.setattr(antiwindup.build, "start", start)
+    monkeypatch.setattr(antiwindup.build, "load_ahead", lambda: None)
+    monkeypatch.setattr(os, "fsync", lambda _: None)
     monkeypatch.setattr(
         antiwindup.build, "code_of", lambda command: "".join(code[word] for word in command if word in code)
     )

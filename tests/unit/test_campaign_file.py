@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,16 +18,16 @@ from design.design_file import Design
 from experiments.__main__ import main
 from experiments.campaign import checkpoint, run_campaign
 from experiments.campaign.checkpoint import CampaignFile
-from experiments.campaign.run_plants import Campaign, Columns, code_sha256
+from experiments.campaign.run_plants import Campaign, Chunk, Columns
 from experiments.thesis.printed_choices import thesis_reference
 from identification.base.errors import InputError
 
 PLANTS = 7
-Chunk = tuple[int, int]
 
 
-def made_up(campaign: Campaign, first: int, last: int) -> Columns:
+def made_up(campaign: Campaign, chunk: Chunk) -> Columns:
     """Rows that hang on the seed and the plant alone, and take no time."""
+    first, last = chunk
     count = 3 * (last - first)
     rows: Columns = {"plant": list(np.repeat(range(first, last), 3)), "anti_windup": ["none", "thesis", "corrected"]}
     rows["anti_windup"] *= last - first
@@ -36,19 +37,22 @@ def made_up(campaign: Campaign, first: int, last: int) -> Columns:
     return rows | {"guaranteed_sector": [0.0] * count}
 
 
+def one_after_another(
+    work: Callable[[Chunk], Columns], chunks: list[Chunk], _: object
+) -> Iterator[tuple[int, Columns]]:
+    return ((number, work(chunk)) for number, chunk in enumerate(chunks))
+
+
 @pytest.fixture
 def campaign(extended_design: Design) -> Campaign:
     reference = thesis_reference("extended", extended_design.reference_omegas)
-    return Campaign(extended_design, "of a test", 1, reference, (-12.0, 12.0), 5, code_sha256())
+    return Campaign(extended_design, "of a test", 1, reference, (-12.0, 12.0), 5)
 
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    def run_here(campaign: Campaign, chunks: list[Chunk]) -> Iterator[tuple[Chunk, Columns]]:
-        for chunk in chunks:
-            yield chunk, made_up(campaign, *chunk)
-
-    monkeypatch.setattr(run_campaign, "run_here", run_here)
+    monkeypatch.setattr(run_campaign, "run_chunk", made_up)
+    monkeypatch.setattr(run_campaign, "spread", one_after_another)
     monkeypatch.setattr(checkpoint, "CHUNK", 2)
 
 
@@ -67,7 +71,7 @@ def run(design: Path, seed: int, output: Path) -> Result:
 def kept(output: Path, campaign: Campaign, design: Path) -> CampaignFile:
     file = CampaignFile(output, campaign, PLANTS, design)
     for chunk in file.missing:
-        file.keep(chunk, made_up(campaign, *chunk))
+        file.keep(chunk, made_up(campaign, chunk))
     return file
 
 
@@ -79,12 +83,12 @@ def test_of_two_campaigns_into_one_file_the_second_ends_at_once(
     output, seconds = tmp_path / "both.parquet", []
     (tmp_path / "link.parquet").symlink_to(output)
 
-    def run_here(campaign: Campaign, chunks: list[Chunk]) -> Iterator[tuple[Chunk, Columns]]:
-        for chunk in chunks:
+    def meanwhile(*asked: Any) -> Iterator[tuple[int, Columns]]:
+        for answer in one_after_another(*asked):
             seconds.append(run(design, other_seed, tmp_path / "link.parquet"))
-            yield chunk, made_up(campaign, *chunk)
+            yield answer
 
-    monkeypatch.setattr(run_campaign, "run_here", run_here)
+    monkeypatch.setattr(run_campaign, "spread", meanwhile)
     first = run(design, 1, output)
     assert first.exit_code == 0, first.output
     assert first.stderr == ""
@@ -102,7 +106,7 @@ def test_a_part_with_any_bit_changed_runs_again(campaign: Campaign, design: Path
     file = kept(tmp_path / "damaged.parquet", campaign, design)
     part = min(file.folder.glob("part-*"))
     whole, rng = part.read_bytes(), np.random.default_rng(2)
-    for place in rng.integers(len(whole), size=300):
+    for place in rng.integers(len(whole), size=40):
         damaged = bytearray(whole)
         damaged[place] ^= 1 << rng.integers(8)
         part.write_bytes(damaged)
@@ -117,6 +121,12 @@ def test_a_part_with_any_bit_changed_runs_again(campaign: Campaign, design: Path
     assert not again.folder.exists()
 
 
+def test_the_parts_of_a_large_campaign_are_fewer_and_larger(campaign: Campaign, design: Path, tmp_path: Path) -> None:
+    missing = CampaignFile(tmp_path / "large.parquet", campaign, 10**6 + 1, design).missing
+    assert [missing[0], missing[-1]] == [(0, 250), (10**6, 10**6 + 1)]
+    assert len(missing) == 4001
+
+
 def test_a_part_of_another_campaign_is_none_of_this(campaign: Campaign, design: Path, tmp_path: Path) -> None:
     """Its name and number are as good; it stays where it is, and is named."""
     other = kept(tmp_path / "other.parquet", replace(campaign, seed=2), design)
@@ -128,7 +138,7 @@ def test_a_part_of_another_campaign_is_none_of_this(campaign: Campaign, design: 
     assert again.missing == [(0, 2)]
     kept(file.output, campaign, design).finish()
     rows = parquet.read_table(BytesIO(file.output.read_bytes())).to_pydict()
-    expected = made_up(campaign, 0, PLANTS)
+    expected = made_up(campaign, (0, PLANTS))
     assert {name: rows[name] for name in expected} == {name: list(values) for name, values in expected.items()}
     assert [path.name for path in file.folder.iterdir()] == [foreign.name]
 
@@ -150,7 +160,7 @@ def test_a_folder_that_cannot_hold_parts_is_refused_before_anything_runs(
     def never(*_: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(run_campaign, "run_here", never)
+    monkeypatch.setattr(run_campaign, "spread", never)
     (tmp_path / "file.parquet.parts").touch()
     (tmp_path / "folder.parquet").mkdir()
     for name, sentence in {

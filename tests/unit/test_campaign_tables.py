@@ -213,7 +213,7 @@ def test_a_damaged_file_gives_no_other_numbers(tmp_path: Path) -> None:
     path = written(tmp_path / "campaign.parquet", plants())
     whole, expected = path.read_bytes(), campaign_tables(path)
     rng, refusals = np.random.default_rng(1), []
-    for place in rng.integers(len(whole), size=300):
+    for place in rng.integers(len(whole), size=80):
         damaged = bytearray(whole)
         damaged[place] ^= 1 << rng.integers(8)
         path.write_bytes(damaged)
@@ -224,7 +224,7 @@ def test_a_damaged_file_gives_no_other_numbers(tmp_path: Path) -> None:
             continue
         for name, table in expected.items():
             pd.testing.assert_frame_equal(found[name], table, check_exact=True)
-    assert len(refusals) > 150
+    assert len(refusals) > 40
     assert all(sentence.startswith(f"{path}: ") and "\n" not in sentence for sentence in refusals)
 
 

@@ -98,7 +98,7 @@ def exact_area(rates: list[mp.mpc], coefficients: list[mp.mpc], cell_s: mp.mpf, 
     return mp.fsum(abs(b - a) for a, b in pairwise(at))
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("periodic", [True, False])
 @pytest.mark.parametrize("coarse", [False, True])
 def test_what_weights_prove_is_less_than_forty_digits_say(seed: int, periodic: bool, coarse: bool) -> None:

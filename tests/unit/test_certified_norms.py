@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import numpy as np
 import pytest
+from flint import fmpq, fmpq_poly
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -13,7 +12,7 @@ from design.anti_windup.compensator import AntiWindup, from_one_plus, second_ord
 from design.anti_windup.popov import popov_sector
 from design.blocks.block import Block
 from design.blocks.frequency_peak import CERTIFIED, block_norm, frequency_grid, peak
-from design.blocks.positivity import combined, multiplied, not_positive_at, squared_magnitude
+from design.blocks.positivity import exact, not_positive_at, squared_magnitude
 from identification.base.errors import InputError
 from identification.model.modes import Mode
 
@@ -74,22 +73,19 @@ def test_the_search_finds_the_highest_of_many_peaks() -> None:
 @pytest.mark.parametrize("margin", [1e-3, 1e-6, 1e-9, 1e-12])
 def test_a_polynomial_that_almost_vanishes(margin: float) -> None:
     """(x - 2)^2 + margin^2 is positive, with - margin^2 it is not, and the double root is undecided."""
-    square = multiplied([Fraction(-2), Fraction(1)], [Fraction(-2), Fraction(1)])
-    size = [Fraction(margin) ** 2]
+    square = fmpq_poly([-2, 1]) ** 2
     for sign, positive in ((1, True), (-1, False), (0, False)):
-        found = not_positive_at(
-            multiplied(combined(Fraction(1), square, Fraction(sign), size), [Fraction(1), Fraction(1)])
-        )
+        found = not_positive_at((square + sign * exact(margin) ** 2) * fmpq_poly([1, 1]))
         assert (found is None) == positive
         if not positive:
             assert found == pytest.approx(2.0, abs=1.01 * margin + 1e-12)
 
 
 def test_a_polynomial_that_is_negative_at_an_end() -> None:
-    assert not_positive_at([Fraction(-1), Fraction(1)]) == 0.0
-    assert not_positive_at([Fraction(0), Fraction(1)]) == 0.0
-    assert not_positive_at([Fraction(1), Fraction(-1, 10**40)]) == np.inf
-    assert not_positive_at([Fraction(1), Fraction(0)]) is None
+    assert not_positive_at(fmpq_poly([-1, 1])) == 0.0
+    assert not_positive_at(fmpq_poly([0, 1])) == 0.0
+    assert not_positive_at(fmpq_poly([1, fmpq(-1, 10**40)])) == np.inf
+    assert not_positive_at(fmpq_poly([1, 0])) is None
     assert not_positive_at(squared_magnitude([complex(-3e-8, 4e7), complex(-3e-8, -4e7), -1e20 + 0j])) is None
 
 

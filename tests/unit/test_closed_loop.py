@@ -106,19 +106,11 @@ def test_first_exit_finds_the_first_of_close_roots() -> None:
     assert first_exit(g, 0.29) == -1.0
 
 
-@pytest.mark.parametrize(("kind", "horizon_s"), [("none", 0.7), ("thesis", 0.35), ("corrected", 0.35)])
-def test_extended_loop_agrees_with_the_independent_integrator(
-    extended_design: Design, kind: str, horizon_s: float
-) -> None:
-    anti_windup = {
-        "none": None,
-        "thesis": extended_design.compensator("thesis"),
-        "corrected": extended_design.compensator("corrected"),
-    }[kind]
-    loop = design_loop(extended_design, thesis_reference("extended", [1.5]), anti_windup)
+def test_extended_loop_agrees_with_the_independent_integrator(extended_design: Design) -> None:
+    loop = design_loop(extended_design, thesis_reference("extended", [1.5]), extended_design.compensator("corrected"))
     # y is delayed: watch the plant's state behind it as well
     loop.outputs["p"] = (loop.Z[0], np.zeros(3))  # type: ignore[index]
-    t = np.arange(0, horizon_s, 0.01)
+    t = np.arange(0, 0.35, 0.01)
     run = simulate(loop, (-12.0, 12.0), t)
     control, outputs = reference_run(loop, (-12.0, 12.0), t)
     assert len(run.events_s) > 3

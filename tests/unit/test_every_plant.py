@@ -58,7 +58,7 @@ def bound_of(plant: PlantModel, omega: float, share: float = 0.05) -> AdditiveBo
     return AdditiveBound.printed_form(size, 3 * omega, 10 * omega, 0.3)
 
 
-@pytest.fixture(scope="module", params=range(24))
+@pytest.fixture(scope="module", params=range(16))
 def design(request: pytest.FixtureRequest) -> Design:
     random = np.random.default_rng(request.param)
     plant = random_plant(random)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,7 +16,7 @@ from click.testing import CliRunner
 import identification
 from identification.__main__ import main
 from identification.base.errors import InputError
-from identification.fit_model import fit_model
+from identification.fit_model import ModelFit, fit_model
 from identification.fitting.dead_time import same_turn, spacing_of
 from identification.fitting.fit_plant import fit_plant
 from identification.model.modes import Mode
@@ -312,15 +313,21 @@ def test_a_band_that_is_none_is_a_mistake(tmp_path: Path) -> None:
 # units
 
 
+@cache
+def fitted(count: int) -> tuple[list[FrequencyResponse], ModelFit]:
+    """So many tests of a pair of modes, and their fit."""
+    tests = [measured(PAIR, seed=k, name=f"day {k}") for k in range(count)]
+    return tests, fit_model(tests)
+
+
 @pytest.mark.parametrize("count", [1, 3])
 @pytest.mark.parametrize(
     ("of_response", "of_time"), [(1e-30, 1.0), (1e30, 1.0), (-1e3, 1.0), (1.0, 1e-15), (1.0, 1e15), (-1e-20, 1e10)]
 )
 def test_units_and_sign_do_not_matter(count: int, of_response: float, of_time: float) -> None:
     """The plant to 1e-6, W_a to its own 1e-3, and as many sentences, over sixty and thirty decades."""
-    tests = [measured(PAIR, seed=k, name=f"day {k}") for k in range(count)]
-    scaled = [replace(t, omega=t.omega / of_time, response=t.response * of_response) for t in tests]
-    usual, other = fit_model(tests), fit_model(scaled)
+    tests, usual = fitted(count)
+    other = fit_model([replace(t, omega=t.omega / of_time, response=t.response * of_response) for t in tests])
     s = 1j * np.geomspace(3.0, 400.0, 50)
     np.testing.assert_allclose(other.model.plant(s / of_time), usual.model.plant(s) * of_response, rtol=1e-6)
     found, expected = (abs(m.model.additive_bound(s / t)) for m, t in ((other, of_time), (usual, 1.0)))

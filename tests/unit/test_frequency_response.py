@@ -14,8 +14,9 @@ from sweep_columns import COLUMNS, FREQUENCY_HZ, RESPONSE
 
 from data.thesis import THESIS
 from identification.base.errors import InputError
+from identification.sweeps.input_files import input_files
 from identification.sweeps.kept_responses import write_responses
-from identification.sweeps.read_sweeps import input_files, read_sweeps
+from identification.sweeps.read_sweeps import read_sweeps
 from identification.sweeps.response import FrequencyResponse
 
 FRF = ["frequency_hz,magnitude_db,phase_deg,coherence"] + [f"{f},{-f},{10 * f},0.9" for f in range(1, 11)]

@@ -17,7 +17,7 @@ from benchmarks.fuzz.kinds import KINDS, Case
 from identification.base.command_line import CommandGroup
 from identification.base.errors import InputError
 
-CASES = 500
+CASES = 200
 FAILED = sorted(path.parent for path in CORPUS.rglob("command.json"))
 
 

@@ -10,11 +10,14 @@ from scipy.linalg import expm
 from scipy.signal import cont2discrete, dlsim, lfilter, zpk2ss
 from test_coprime_form import PLANTS, design_of
 
+from design.anti_windup.other_anti_windups import OTHERS
 from design.blocks.block import plant_block
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
 from experiments.drive.held_plant import held_plant
 from experiments.drive.sampled_loop import FORMS, Drive, simulate_sampled
+from experiments.engine.simulate import simulate
+from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference, sinusoid
 from identification.base.errors import InputError
 from identification.model.additive_bound import AdditiveBound
@@ -59,6 +62,18 @@ def test_it_tends_to_the_continuous_controller(design: Design) -> None:
         ]
         apart.append(np.abs(runs[0] - runs[1]).max() / np.abs(runs[1]).max())
     assert apart[1] < max(apart[0] / 3, 1e-9) < 0.05
+
+
+@pytest.mark.parametrize(("plant", "name"), [("one integrator", "thesis"), *(("none", name) for name in OTHERS)])
+def test_the_saturated_loop_tends_to_the_continuous_one(plant: str, name: str) -> None:
+    """With every anti-windup; the difference is of the order of the rate at which the limits are left."""
+    design, reference = design_of(PLANTS[plant]), sinusoid(1.0, 1.5, 1.2)
+    kind, limits, apart = design.chosen(name), 1.1 * reference.required(design.plant).value * np.array([-1.0, 1.0]), []
+    for rate in (100.0, 800.0):
+        run = simulate_sampled(design, reference, kind, Drive(rate, "matched", (limits[0], limits[1])), 30.0)
+        exact = simulate(design_loop(design, reference, kind), (limits[0], limits[1]), run.time_s[1:])
+        apart.append(np.abs(run.output[1:] - exact.outputs["output"]).max() / np.abs(run.output).max())
+    assert apart[1] < max(apart[0] / 3, 1e-9) < 0.1
 
 
 @pytest.mark.parametrize("name", ["one integrator", "none", "no dead time"])

@@ -165,7 +165,7 @@ def test_a_member_that_is_given_twice_is_refused(implied: IdentifiedModel, tmp_p
 
 LOOKS = re.compile(r"\.(exists|is_file|is_dir|resolve)\(")
 LOOKED_AT = (  # at files of the program's own, or where the path of a command has been looked at already
-    *("antiwindup/code_files.py", "identification/base/files.py", "identification/base/temporary_cache.py"),
+    *("antiwindup/code_files.py", "identification/base/files.py", "identification/base/cache_folders.py"),
     *("experiments/campaign/checkpoint.py", "experiments/thesis/claims/equations_page.py"),
 )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
@@ -208,7 +209,7 @@ def test_first_time_within_a_band_from_rest() -> None:
     rest = RestLimit(integrator(7.105, 0.3), CHAPTER_4, 14.0, steps=60)
     found = rest.settling(0.5)
     starts = np.linspace(0.3, 1.5, 481)
-    exact = next(t for t in starts if floor_of_slopes(CHAPTER_4, 7.105 * 14.0, t, 4.0, 0.3) <= 0.5)
+    exact = starts[bisect_left(starts, -0.5, key=lambda t: -floor_of_slopes(CHAPTER_4, 7.105 * 14.0, t, 4.0, 0.3))]
     assert found.lower <= exact <= found.upper + starts[1] - starts[0]
     assert found.upper - found.lower <= 2.01 * (rest.start_s(1) - rest.start_s(0))
     assert rest.settling(51.0) == Interval(0.0, 0.0)
@@ -359,21 +360,21 @@ def test_command_line(extended_design: Design, tmp_path: Path, monkeypatch: pyte
     asked = []
 
     def found(
-        design: Design, reference: Reference, limits: Sequence[float], tick: object, *runs: object
+        design: Design, reference: Reference, limits: Sequence[float], tick: object, *runs: object, scheduler: str
     ) -> dict[str, pd.DataFrame]:
-        asked.append((design.kind, reference, limits, *runs))
+        asked.append((design.kind, reference, limits, *runs, scheduler))
         return {"limits_extended": pd.DataFrame({"limit": [2.0]}), "limits_extended_summary": pd.DataFrame({"a": [1]})}
 
     monkeypatch.setattr("experiments.physical_limits.limits_tables.limits_tables", found)
     path = tmp_path / "design.json"
     path.write_text(extended_design.to_json(), encoding="utf-8")
     own = ["limits", "--limit", "9", "--limit", "-3", "12.5", "--amplitude", "7", "--offset", "2", "--rate-limit", "4"]
-    for given in (["thesis", "limits"], own):
+    for given in (["thesis", "limits", "--scheduler", "tcp://host:8786"], own):
         result = CliRunner().invoke(main, [*given, str(path), "--output", str(tmp_path)])
         assert (result.exit_code, result.output) == (0, "")
     assert asked == [
-        ("extended", thesis_reference("extended", (1.5,)), several_limits(extended_design)),
-        ("extended", Reference((7.0,), (1.5,), (0.0,), 2.0), ((9.0,), (-3.0, 12.5)), ("none", "corrected"), 4.0),
+        ("extended", thesis_reference("extended", (1.5,)), several_limits(extended_design), "tcp://host:8786"),
+        ("extended", Reference((7.0,), (1.5,), (0.0,), 2.0), ((9.0,), (-3.0, 12.5)), ("none", "corrected"), 4.0, None),
     ]
     assert sorted(file.name for file in tmp_path.glob("*.csv")) == [
         "limits_extended.csv",

@@ -89,9 +89,12 @@ def in_old_units(K: Block, case: Case, time: float, gain: float) -> Block:
     return Block(K.gain * time**K.relative_degree * time ** (degree - 1) * gain, zeros, poles)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", [0, 1, 6, 7])
 def test_what_is_proved_is_true(seed: int) -> None:
-    """The lower bounds and the achieved norms of random plants; gamma_lower against Nehari's theorem in 60 digits."""
+    """The lower bounds and the achieved norms; gamma_lower against Nehari's theorem in 60 digits.
+
+    Of plants with 1, 0, 3 and 2 pairs of modes and a W_a of order 1, 2, 3 and 4.
+    """
     _, problem = stabiliser_problem(*random_case(seed))
     K, found = mixed_sensitivity(problem.G, problem.W1, problem.W2, problem.decay_rate)
     assert nehari_excess(problem.W1, problem.W2, found.gamma_lower, 60) > 0
@@ -101,8 +104,10 @@ def test_what_is_proved_is_true(seed: int) -> None:
     assert max(pole.real for pole in closed_loop_poles(problem.G, K)) < -problem.decay_rate
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize(("time", "gain"), [(2.0**30, 1.0), (2.0**-30, 2.0**50), (1.0, 2.0**-50)])
+@pytest.mark.parametrize(
+    ("seed", "time", "gain"),
+    [(0, 2.0**30, 1.0), (1, 2.0**-30, 2.0**50), (2, 1.0, 2.0**-50), (3, 2.0**30, 2.0**50)],
+)
 def test_powers_of_two_as_units_change_no_bit(seed: int, time: float, gain: float) -> None:
     case = random_case(seed)
     (old_K, old), (new_K, new) = synthesise(case), synthesise(in_units(case, time, gain))
@@ -115,9 +120,12 @@ def test_powers_of_two_as_units_change_no_bit(seed: int, time: float, gain: floa
     assert in_old_units(new_K, case, time, gain) == old_K
 
 
-@pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(
-    ("time", "gain"), [(1e-9, 1.0), (1e9, 1.0), (1.0, 1e-15), (1.0, 1e15), (1e9, 1e-15), (1e-9, 1e15), (1e6, 3.0)]
+    ("seed", "time", "gain"),
+    [
+        *((0, 1e-9, 1.0), (1, 1e9, 1.0), (2, 1.0, 1e-15), (3, 1.0, 1e15)),
+        *((0, 1e9, 1e-15), (1, 1e-9, 1e15), (2, 1e6, 3.0), (3, 1e-9, 1.0)),
+    ],
 )
 def test_the_design_is_the_same_in_any_units(seed: int, time: float, gain: float) -> None:
     case = random_case(seed)

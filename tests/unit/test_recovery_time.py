@@ -6,11 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from design.anti_windup.condition import Sector
 from design.anti_windup.corrected_compensator import RESOLVED, SETTLED, WORTH, corrected
+from design.anti_windup.corrected_program import FEASIBLE
 from design.blocks.block import bound_block
 from design.blocks.frequency_peak import block_norm
 from design.chapters_3_4.design_extended import design_extended
@@ -48,7 +49,11 @@ def least_f(
     return found.f, found.f_lower
 
 
-@settings(max_examples=25, deadline=None)
+F_BELOW_ROUNDING = AdditiveBound(0.03, (), (Mode(1.0, 0.08198893662127436),), (), (25.639998365617146,))
+
+
+@settings(max_examples=8, deadline=None)
+@example(F_BELOW_ROUNDING, [0.0, 1.1713604925825813, 0.875], 2, 0.8125, 2.5)  # f is 1e-7 of ||W_a||
 @given(
     bounds,
     st.lists(st.floats(0.0, 2.5), min_size=3, max_size=3),
@@ -62,9 +67,10 @@ def test_f_does_not_increase_with_the_recovery_time(
     bandwidth = 10**width
     times = np.log(1 / SETTLED) / bandwidth * 10 ** np.sort(decades)
     found = [least_f(bound, float(time), integrators, sector, bandwidth) for time in times]
-    size, _ = block_norm(bound_block(bound))
+    W_a = bound_block(bound)
+    resolved = (RESOLVED + (len(W_a.poles) + 1) * FEASIBLE) * block_norm(W_a)[0]
     for (f, f_lower), (longer, _) in pairwise(found):
-        assert longer <= f * (1 + 1e-5) + RESOLVED * size
+        assert longer <= f * (1 + 1e-5) + resolved
         assert f_lower <= f * (1 + 1e-12)
 
 
@@ -73,7 +79,7 @@ def test_f_of_a_plant_that_once_showed_the_opposite() -> None:
     plant = PlantModel(19.416211763234617, (), (Mode(64.83351679861622, 0.006065211741852967),), 0.04289450322705625)
     plant = PlantModel(plant.gain, (Mode(13.998610151745932, 0.0081),), plant.pole_modes, plant.delay_s)
     bound = AdditiveBound(0.0930769359974999, (), (), (), (23.246528149884053,))
-    times = (0.08, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+    times = (0.08, 0.2, 1.0, 10.0)
     found = [
         design_extended(IdentifiedModel(plant, bound), [1.5], 4.0, [(2.0, 1.0)], recovery_s=time).corrected
         for time in times
@@ -84,7 +90,7 @@ def test_f_of_a_plant_that_once_showed_the_opposite() -> None:
     assert all(each.recovery_s <= time * (1 + 1e-9) for each, time in zip(judged, times, strict=True))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(bounds, st.floats(-9.0, 9.0), st.floats(-15.0, 15.0), st.integers(0, 2), st.floats(0.2, 2.0))
 def test_the_units_do_not_matter(
     bound: AdditiveBound, time_unit: float, gain_unit: float, integrators: int, decades: float

@@ -23,10 +23,11 @@ from experiments.campaign.draw_plants import PlantsWithin
 from experiments.engine.simulate import simulate
 from experiments.runs.compare_anti_windups import loops, run_all, tracking_summary, verdicts
 from experiments.runs.design_loop import design_loop
-from experiments.runs.guarantee import Guarantee, guarantee, guarantee_within, sector_text
+from experiments.runs.guarantee import Guarantee, guarantee, guarantee_within
 from experiments.runs.references import Reference, SampledReference, sinusoid
 from experiments.runs.sector_promise import judge_run, needed_sector, steady_control, verdict
 from experiments.runs.verdict import Verdict
+from experiments.runs.words import sector_text
 from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies.chapter_2 import delay_free_tables
 from experiments.thesis.studies.chapter_4 import extended_tables

@@ -19,7 +19,13 @@ from identification.fitting import grouped_lines
 from identification.fitting.dead_time import group_delay
 from identification.fitting.fit_plant import fit_plant
 from identification.fitting.grouped_lines import grouped
-from identification.fitting.least_squares import BLOCK, _normal_at, information, log_jacobian, response_of
+from identification.fitting.least_squares import (
+    BLOCK,
+    information,
+    log_jacobian,
+    normal_equations,
+    response_of,
+)
 from identification.fitting.likelihood import noise_levels
 from identification.formats import mat_level_5, sizes
 from identification.formats.csv_file import read_csv
@@ -66,7 +72,7 @@ def test_groups_are_weighted_means_with_the_errors_of_means(monkeypatch: pytest.
 
 def test_the_plant_of_very_many_lines_is_that_of_every_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """However few groups chose the structure: no number of the fit comes from them."""
-    test = sweep(np.linspace(*FIVE_TO_200_HZ, 3000))
+    test = sweep(np.linspace(*FIVE_TO_200_HZ, 1200))
     expected = fit_plant([test])
     monkeypatch.setattr(grouped_lines, "MOST_LINES", 400)
     found = fit_plant([test])
@@ -74,7 +80,7 @@ def test_the_plant_of_very_many_lines_is_that_of_every_line(monkeypatch: pytest.
     apart = np.abs(found.nominal.theta - expected.nominal.theta)
     assert np.all(apart < 0.05 * expected.nominal.noise)
     np.testing.assert_allclose(found.nominal.noise, expected.nominal.noise, rtol=1e-4)
-    assert found.tests[0].lines == 3000
+    assert found.tests[0].lines == 1200
     assert found.tests[0].chi_square == pytest.approx(expected.tests[0].chi_square, rel=1e-6)
 
 
@@ -85,7 +91,7 @@ def test_blocks_of_lines_are_added() -> None:
     response = value * (1 + 0.1 * np.sin(omega))
     rows = value[:, None] * log_jacobian(structure, theta, omega) / sigma[:, None]
     residual = (value - response) / sigma
-    cost, slope, curvature = _normal_at(theta, structure.counts, omega, response, sigma, False)
+    cost, slope, curvature = normal_equations(structure, theta, omega, response, sigma, soft=False)
     assert cost == pytest.approx(np.sum(np.abs(residual) ** 2))
     np.testing.assert_allclose(slope, (rows.conj().T @ residual).real, rtol=1e-9, atol=1e-9 * cost)
     for found in (curvature, information(structure, theta, omega, sigma)):
@@ -138,8 +144,8 @@ def test_a_csv_takes_little_more_memory_than_its_text(tmp_path: Path) -> None:
 
 
 def test_windows_of_a_large_record_are_fitted_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
-    time_s = np.arange(2**14) * 1e-3
-    u = np.sin(2 * np.pi * (5 * time_s + 6 * time_s**2))
+    time_s = np.arange(2**12) * 1e-3
+    u = np.sin(2 * np.pi * (5 * time_s + 24 * time_s**2))
     y = np.convolve(u, np.exp(-20 * time_s) * 0.02)[: u.size]
     expected = module.estimate_response(1e-3, u, y)
     monkeypatch.setattr(module, "HELD", 100)
@@ -224,11 +230,11 @@ def test_a_structure_is_unpacked_where_it_is_needed(tmp_path: Path, monkeypatch:
 EXTREMES = (5e-324, 1e-320, 2.3e-308, 1e-160, 1e-60, 1e-49, 1e49, 1e50, 1e160, 1e300, 1.7e308)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_extreme_numbers_end_in_a_sentence_or_a_fit(seed: int, tmp_path: Path) -> None:
     """In one place or a whole column, of a response or a record; beside another band. Warnings count as errors."""
     random = np.random.default_rng(seed)
-    frequency_hz, time_s = np.linspace(5, 80, 40), np.arange(512) * 1e-3
+    frequency_hz, time_s = np.linspace(5, 80, 24), np.arange(512) * 1e-3
     test = sweep(2 * np.pi * frequency_hz, 0.01)
     u = np.sin(2 * np.pi * (5 * time_s + 120 * time_s**2))
     kinds = (

@@ -220,7 +220,7 @@ def random_loop(random: np.random.Generator) -> DelayLoop:
     return delay_loop(design, dataclasses.replace(plant, gain=gain, delay_s=float(moved) * h))
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(5))
 def test_random_loops_are_stable_in_the_intervals_alone(seed: int) -> None:
     random = np.random.default_rng(seed)
     loop = random_loop(random)
@@ -238,8 +238,7 @@ def test_random_loops_are_stable_in_the_intervals_alone(seed: int) -> None:
         assert end.value * complex(L) == pytest.approx(-1, abs=1e-6)
 
 
-@pytest.mark.parametrize("unit", [1e-9, 1e-4, 1e5, 1e9])
-@pytest.mark.parametrize("gain", [1e-15, 1e15])
+@pytest.mark.parametrize(("unit", "gain"), [(1e-9, 1e-15), (1e-4, 1e15), (1e5, 1e-15), (1e9, 1e15)])
 def test_margins_do_not_depend_on_units(unit: float, gain: float) -> None:
     """The same loop with time in another unit and the plant's output in another."""
     design = three_frequencies(0.08)

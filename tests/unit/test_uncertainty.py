@@ -15,7 +15,8 @@ from identification.base.errors import InputError
 from identification.bound import bound_residuals as module
 from identification.bound.bound_residuals import bound_residuals
 from identification.bound.envelope import envelope_of
-from identification.model.additive_bound import HIGHEST_ORDER, AdditiveBound
+from identification.bound.orders import HIGHEST_ORDER
+from identification.model.additive_bound import AdditiveBound
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 from identification.sweeps.response import FrequencyResponse

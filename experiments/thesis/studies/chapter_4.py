@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from data.thesis import printed_numbers
 from design.design_file import Design
 from experiments.engine.pade import with_pade
 from experiments.engine.saturated_loop import SaturatedLoop
@@ -15,9 +14,9 @@ from experiments.runs.design_loop import design_loop
 from experiments.runs.metrics import last_saturation
 from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies.chapter_2 import as_thesis
+from experiments.thesis.studies.desaturation import PERIODS, desaturation
 from identification.base.errors import InputError
 
-PERIODS = 5  # the thesis does not print its horizon
 SAMPLES_PER_PERIOD = 4000
 PADE_ORDER = 2  # section 4.2
 
@@ -73,19 +72,6 @@ def usual_limit(design: Design) -> float:
     target, horizon = desaturation(period), PERIODS * period
     loop = design_loop(design, reference, None)
     return limit_for_last_saturation(loop, target, reference.required(design.loop_plant).value, horizon)
-
-
-def desaturation(period_s: float) -> float:
-    """The thesis's "around 4 seconds" in which the loop leaves saturation, as a share of its reference's period.
-
-    Parameters
-    ----------
-    period_s
-        Of the reference's slowest sinusoid; the printed one gives the printed time.
-    """
-    chosen = printed_numbers()["extended"]
-    own = thesis_reference("extended", [chosen["reference"]["omega"]]).period_s
-    return float(chosen["desaturation_s"]) * (period_s / own)
 
 
 def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: float, horizon_s: float) -> float:

@@ -6,6 +6,7 @@ from data.thesis import printed_numbers
 from design.design_file import Design
 from experiments.thesis.printed_choices import thesis_reference
 from experiments.thesis.studies import chapter_2, chapter_4
+from experiments.thesis.studies.desaturation import PERIODS
 
 MULTIPLES = (0.8, 0.9, 0.95, 0.98, 1.05, 1.2, 1.5)  # of the control that perfect tracking needs
 USUAL_MULTIPLE = 1.2
@@ -26,7 +27,7 @@ def usual_limit(design: Design) -> float:
 
 def usual_periods(design: Design) -> int:
     """The length of a run in periods of the reference, as in the design kind's own experiment."""
-    return chapter_4.PERIODS if design.kind == "extended" else chapter_2.PERIODS
+    return PERIODS if design.kind == "extended" else chapter_2.PERIODS
 
 
 def several_limits(design: Design) -> list[float]:

@@ -9,7 +9,15 @@ import numpy as np
 import pandas as pd
 
 from design.blocks.frequency_peak import peak
-from design.chapters_3_4.interpolate_Q import Conditions, StableFunction, by_poles, by_zeros, conditions, lagrange
+from design.chapters_3_4.interpolate_Q import (
+    Conditions,
+    StableFunction,
+    by_poles,
+    by_zeros,
+    conditions,
+    lagrange,
+    wanted_at,
+)
 from design.chapters_3_4.smith_predictor import free_part
 from design.design_file import Design
 from identification.base.errors import InputError
@@ -57,12 +65,16 @@ def interpolation_tables(design: Design) -> dict[str, pd.DataFrame]:
         ends = [(part["omega"].iloc[first], part["omega"].iloc[last - 1]) for first, last in edges.reshape(-1, 2)]
         for lowest, highest in ends or [(np.nan, np.nan)]:
             summary.append({"method": name, "lowest": lowest, "highest": highest, "a": a, "delay_s": delay_s})
-    products = [(x, y) for y in np.geomspace(1e-3, 10, 61) for x in np.geomspace(1e-2, 20, 151)]
-    stable = [_poles_are_stable(x, y) for x, y in products]
+    omega_delay, a_delay = (
+        each.ravel() for each in np.meshgrid(np.geomspace(1e-2, 20, 151), np.geomspace(1e-3, 10, 61))
+    )
+    stable = _poles_are_stable(omega_delay, a_delay)
     return {
         "interpolation": table,
         "interpolation_summary": pd.DataFrame(summary),
-        "interpolation_map": pd.DataFrame(products, columns=["omega_delay", "a_delay"]).assign(stable=stable),
+        "interpolation_map": pd.DataFrame(
+            {"omega_delay": omega_delay, "a_delay": a_delay, "stable": stable.astype(int)}
+        ),
     }
 
 
@@ -80,9 +92,7 @@ def _judge(method: Callable[[Conditions], StableFunction], omega: float, delay_s
     return {"stable": 1, "outer": int(outer), "sensitivity": sensitivity, "works": int(works)}
 
 
-def _poles_are_stable(omega_delay: float, a_delay: float) -> int:
-    try:
-        by_poles(conditions([omega_delay], 1.0, a_delay))
-    except InputError:
-        return 0
-    return 1
+def _poles_are_stable(omega: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """Whether 1/Q = c_2 s^2 + c_1 s + c_0 through the conditions, with T_d = 1, has all coefficients positive."""
+    inverse, c_0 = 1 / wanted_at(omega, 1.0, a), 1 / (a * (1 + a))
+    return np.asarray((inverse.imag > 0) & (inverse.real < c_0))

@@ -15,7 +15,8 @@ from experiments.engine.simulate import DivergenceError
 from experiments.rates import numbers_of, rows_of, usual_rates
 from experiments.runs.compare_anti_windups import NAMES, loops, run_all, span
 from experiments.thesis.printed_choices import thesis_reference
-from experiments.thesis.studies.chapter_4 import PERIODS, usual_limit
+from experiments.thesis.studies.chapter_4 import usual_limit
+from experiments.thesis.studies.desaturation import PERIODS
 from identification.base.errors import InputError
 
 # Our choices, in units of the design: the thesis has no computer and no drive.

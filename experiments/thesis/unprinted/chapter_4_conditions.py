@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import NamedTuple
+from functools import cache, cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,13 +13,15 @@ from design.blocks.block import plant_block
 from design.blocks.state_space import realize
 from design.design_file import Design
 from experiments.engine.pade import with_pade
+from experiments.engine.ready_loop import ReadyLoop, ready_loop
 from experiments.engine.saturated_loop import SaturatedLoop
-from experiments.runs.compare_anti_windups import run_all
+from experiments.engine.simulate import DivergenceError, simulate
 from experiments.runs.design_loop import design_loop
 from experiments.runs.references import Reference
 from experiments.thesis.printed_choices import chapter_4, thesis_reference
-from experiments.thesis.studies.chapter_4 import PADE_ORDER, PERIODS
-from experiments.thesis.unprinted.printed_outcomes import with_anti_windup, without_anti_windup
+from experiments.thesis.studies.chapter_4 import PADE_ORDER
+from experiments.thesis.studies.desaturation import PERIODS
+from experiments.thesis.unprinted.printed_outcomes import OUTCOMES, with_anti_windup, without_anti_windup
 
 SETS = ("implied", "table")
 DELAYS = ("exact", "pade")
@@ -30,6 +33,13 @@ class Point(NamedTuple):
 
     limit: float
     output: float
+
+
+class Prepared(NamedTuple):
+    """A loop from rest, and by how much its initial state moves with the initial output."""
+
+    rest: ReadyLoop
+    held: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -46,6 +56,10 @@ class Conditions:
 
     set_name: str
     delay: str
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Another process makes its loops once and not for each piece of work."""
+        return _kept, (self.set_name, self.delay)
 
     @cached_property
     def design(self) -> Design:
@@ -68,26 +82,34 @@ class Conditions:
         return float(self.reference(np.array(0.0)))
 
     @cached_property
-    def _loops(self) -> dict[str, SaturatedLoop]:
+    def _prepared(self) -> dict[str, Prepared]:
         kinds = {"none": None, "thesis": self.design.compensator("thesis")}
-        loops = {name: design_loop(self.design, self.reference, kind) for name, kind in kinds.items()}
-        return {name: replace(loop, outputs={"error": loop.outputs["error"]}) for name, loop in loops.items()}
+        return {name: self._prepare(design_loop(self.design, self.reference, kind)) for name, kind in kinds.items()}
 
-    def loop(self, kind: str, output: float) -> SaturatedLoop:
+    def _prepare(self, loop: SaturatedLoop) -> Prepared:
+        watched = replace(loop, outputs={"error": loop.outputs["error"]})
+        rest, raised = (starting_at(watched, self.design, output) for output in (0.0, 1.0))
+        if self.delay == "pade":
+            rest, raised = (with_pade_at_rest(one, PADE_ORDER) for one in (rest, raised))
+        return Prepared(ready_loop(rest), raised.x0 - rest.x0)
+
+    def loop(self, kind: str, output: float) -> ReadyLoop:
         """The loop "none" (without anti-windup) or "thesis" (with the thesis's) from y(0) = ``output``, see
         :func:`starting_at`."""
-        loop = starting_at(self._loops[kind], self.design, output)
-        return with_pade_at_rest(loop, PADE_ORDER) if self.delay == "pade" else loop
+        rest, held = self._prepared[kind]
+        return rest.starting_from(rest.loop.x0 + output * held)
 
     def outcomes(self, kind: str, point: Point, samples: int = SAMPLES_PER_PERIOD) -> dict[str, float]:
         """What the loop of :meth:`loop` comes to in every reading, from so many samples of each of five periods.
 
         NaN is never; all are NaN when the loop diverges.
         """
-        period = self.reference.period_s
+        period, limit = self.reference.period_s, point.limit
         time_s = np.linspace(0.0, PERIODS * period, PERIODS * samples + 1)
-        loop = self.loop(kind, point.output)
-        run = run_all({kind: loop}, point.limit, time_s)[kind]
+        try:
+            run = simulate(self.loop(kind, point.output), (-limit, limit), time_s)
+        except DivergenceError:
+            return dict.fromkeys(OUTCOMES[kind], math.nan)
         if kind == "none":
             return without_anti_windup(run, period)
         return with_anti_windup(run, self.reference.amplitude, period)
@@ -95,6 +117,11 @@ class Conditions:
     def both(self, point: Point, samples: int = SAMPLES_PER_PERIOD) -> dict[str, float]:
         """The outcomes of both loops."""
         return self.outcomes("none", point, samples) | self.outcomes("thesis", point, samples)
+
+
+@cache
+def _kept(set_name: str, delay: str) -> Conditions:
+    return Conditions(set_name, delay)
 
 
 def starting_at(loop: SaturatedLoop, design: Design, output: float) -> SaturatedLoop:

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from scipy.optimize import minimize
 
-from experiments.runs.batch import Tick, threaded
+from experiments.runs.batch import Each, threaded
 from experiments.thesis.unprinted.chapter_4_conditions import Conditions, Point
-from experiments.thesis.unprinted.printed_outcomes import CONVERGED_PERCENT, READINGS, Found, compared, printed_outcomes
+from experiments.thesis.unprinted.printed_outcomes import CONVERGED_PERCENT, READINGS, printed_outcomes
+from experiments.thesis.unprinted.where_met import Found, compared
 
-STARTS = 3  # the best points of the grid from which the search goes on
-EVALUATIONS = 40  # of one such search
+STARTS = 3  # the best initial outputs of the grid, from which the search goes on
+EVALUATIONS = 30  # of one such search
 SEARCHES = {"together": False, "together, converging": True}
 """What is searched for -> whether the error with anti-windup must converge to zero."""
+
+_MOST = 1e6  # stands for an infinite miss: the search takes differences
 
 
 class Joint(NamedTuple):
@@ -41,6 +45,9 @@ class Joint(NamedTuple):
     outcomes: Mapping[str, float]
 
 
+Start = tuple[Conditions, Joint, list[np.ndarray], bool]  # with the grid's limits and outputs, and whether to converge
+
+
 def judged(point: Point, outcomes: Mapping[str, float], converging: bool) -> Joint:
     """How near a point comes, each outcome in the reading that comes nearest.
 
@@ -57,61 +64,57 @@ def judged(point: Point, outcomes: Mapping[str, float], converging: bool) -> Joi
     The measure is our choice. Outcomes that are all within half a unit of their last digits miss by at most the
     greatest half_unit/printed, 0.125 for "around 4".
     """
-    misses, readings = [], []
+    found = _nearest_readings(outcomes)
+    worst = max(miss for miss, _ in found)
+    met = not converging or outcomes["final_error_percent"] < CONVERGED_PERCENT
+    return Joint(worst if met else math.inf, point, tuple(reading for _, reading in found), outcomes)
+
+
+def _nearest_readings(outcomes: Mapping[str, float]) -> list[tuple[float, str]]:
+    """Of each outcome that has been computed: by how much its nearest reading misses, and which that is."""
+    found = []
     for outcome, names in READINGS.items():
-        sizes = {name: abs(outcomes[name] / printed_outcomes()[outcome].value - 1) for name in names}
-        nearest = min(names, key=lambda name: sizes[name] if math.isfinite(sizes[name]) else math.inf)
-        readings.append(nearest)
-        misses.append(sizes[nearest])
-    met = np.isfinite(misses).all() and (not converging or outcomes["final_error_percent"] < CONVERGED_PERCENT)
-    return Joint(max(misses) if met else math.inf, point, tuple(readings), outcomes)
+        if names[0] in outcomes:
+            misses = [abs(outcomes[name] / printed_outcomes()[outcome].value - 1) for name in names]
+            found.append(
+                min((math.inf if math.isnan(miss) else miss, name) for miss, name in zip(misses, names, strict=True))
+            )
+    return found
 
 
-def nearest(one: Conditions, points: pd.DataFrame, converging: bool) -> Joint | None:
-    """The limit and the initial output of the least miss under a condition.
-
-    Parameters
-    ----------
-    one
-        The condition.
-    points
-        Its rows of :func:`experiments.thesis.unprinted.search.grid_of`.
-    converging
-        See :func:`judged`.
-
-    Returns
-    -------
-    Joint or None
-        None when no point of the grid has all three outcomes.
-
-    Notes
-    -----
-    From the best points of the grid Nelder and Mead's search goes on within the grid's bounds. What it finds is a
-    local minimum; the outcomes jump.
-    """
-    rows = points.to_dict("records")
-    every = [judged(Point(row["limit"], row["initial_output"]), row, converging) for row in rows]  # type: ignore[arg-type]
-    best = sorted((joint for joint in every if math.isfinite(joint.miss)), key=lambda joint: joint[:2])[:STARTS]
-    if not best:
-        return None
-    return min((_refined(one, start, points, converging) for start in best), key=lambda joint: joint[:2])
-
-
-def _refined(one: Conditions, start: Joint, points: pd.DataFrame, converging: bool) -> Joint:
+def _starts(one: Conditions, points: pd.DataFrame, converging: bool) -> list[Start]:
+    """The best initial outputs of a grid, each with its best limit; none where no point has all three outcomes."""
+    best: dict[float, Joint] = {}  # of each initial output
+    for row in points.to_dict("records"):
+        joint = judged(Point(row["limit"], row["initial_output"]), row, converging)  # type: ignore[arg-type]
+        best[joint.point.output] = min(joint, best.get(joint.point.output, joint), key=lambda joint: joint[:2])
+    starts = sorted((joint for joint in best.values() if math.isfinite(joint.miss)), key=lambda joint: joint[:2])
     shared = points[points.duplicated("limit", keep=False)]  # the grid's own, without what it was refined by
     axes = [np.unique(frame[name]) for frame, name in ((shared, "limit"), (points, "initial_output"))]
-    seen = [start]
+    return [(one, start, axes, converging) for start in starts[:STARTS]]
+
+
+def _refined(start: Start) -> Joint:
+    """The nearest that Nelder and Mead's search finds from a point within the bounds of its grid: a local minimum."""
+    one, first, axes, converging = start
+    best = first
 
     def miss(x: np.ndarray) -> float:
+        nonlocal best
         point = Point(*(float(np.clip(at, axis[0], axis[-1])) for at, axis in zip(x, axes, strict=True)))
-        seen.append(judged(point, one.both(point), converging))
-        return min(seen[-1].miss, 1e6)  # the search takes differences
+        outcomes = one.outcomes("none", point)
+        least = max(miss for miss, _ in _nearest_readings(outcomes))
+        if least >= best.miss:  # whatever the other loop comes to, the point is no better
+            return min(least, _MOST)
+        joint = judged(point, outcomes | one.outcomes("thesis", point), converging)
+        best = min(best, joint, key=lambda joint: joint[:2])
+        return min(joint.miss, _MOST)
 
-    steps = [_spacing(axis, at) / 2 for axis, at in zip(axes, start.point, strict=True)]
-    simplex = np.array(start.point) + np.array([[0.0, 0.0], [steps[0], 0.0], [0.0, steps[1]]])
+    steps = [_spacing(axis, at) / 2 for axis, at in zip(axes, first.point, strict=True)]
+    simplex = np.array(first.point) + np.array([[0.0, 0.0], [steps[0], 0.0], [0.0, steps[1]]])
     options: Any = {"maxfev": EVALUATIONS, "initial_simplex": simplex, "xatol": 1e-6, "fatol": 1e-4}
     minimize(miss, simplex[0], method="Nelder-Mead", options=options)
-    return min(seen, key=lambda joint: joint[:2])
+    return best
 
 
 def _spacing(axis: np.ndarray, at: float) -> float:
@@ -120,7 +123,7 @@ def _spacing(axis: np.ndarray, at: float) -> float:
     return float(axis[place + 1] - axis[place])
 
 
-def together(conditions: Sequence[Conditions], points: pd.DataFrame, tick: Tick = lambda: None) -> pd.DataFrame:
+def together(conditions: Sequence[Conditions], points: pd.DataFrame, each: Each = threaded) -> pd.DataFrame:
     """For each of :data:`SEARCHES` and each condition the nearest that one limit and one initial output come.
 
     Parameters
@@ -128,7 +131,7 @@ def together(conditions: Sequence[Conditions], points: pd.DataFrame, tick: Tick 
     conditions
         Parameter sets with delays.
     points
-        Of :func:`experiments.thesis.unprinted.search.grid_of`.
+        Of :func:`experiments.thesis.unprinted.search.grid_of`, with the exact dead time.
 
     Returns
     -------
@@ -136,24 +139,42 @@ def together(conditions: Sequence[Conditions], points: pd.DataFrame, tick: Tick 
         Three rows, one an outcome, for each: search, worst_miss (:attr:`Joint.miss`), final_error_percent, and the
         columns of :func:`experiments.thesis.unprinted.search.alone`, limit_low and limit_high being the limit where the
         outcome is met. Nothing for a condition under which the outcomes never happen together.
+
+    Notes
+    -----
+    With the exact dead time Nelder and Mead's search goes on from the best initial outputs of the grid. What it finds
+    is a local minimum; the outcomes jump. With Pade's approximation the outcomes are those at the point that the exact
+    dead time has found.
     """
-    jobs = [(search, one) for search in SEARCHES for one in conditions]
-
-    def search(job: tuple[str, Conditions]) -> Joint | None:
-        name, one = job
-        own = points[(points["set"] == one.set_name) & (points["delay"] == one.delay)]
-        return nearest(one, own, SEARCHES[name])
-
+    starts: dict[tuple[str, str], list[Start]] = {}
+    for (name, converging), one in product(SEARCHES.items(), conditions):
+        own = points[points["set"] == one.set_name]
+        if one.delay == "exact":
+            starts[name, one.set_name] = _starts(one, own, converging)
+    refined = iter(each(_refined, [start for several in starts.values() for start in several]))
+    found = {
+        key: min((next(refined) for _ in several), key=lambda joint: joint[:2])
+        for key, several in starts.items()
+        if several
+    }
     rows = []
-    for (name, one), joint in zip(jobs, threaded(search, jobs, tick), strict=True):
-        if joint is None:
-            continue
-        limit, output = joint.point
-        for outcome, reading in zip(READINGS, joint.readings, strict=True):
-            computed, number = joint.outcomes[reading], printed_outcomes()[outcome]
-            edge = limit if abs(computed - number.value) <= number.half_unit else math.nan
-            head = {"search": name, "outcome": outcome, "reading": reading}
-            under = {"set": one.set_name, "delay": one.delay, "initial_output": output}
-            misses = {"worst_miss": joint.miss, "final_error_percent": joint.outcomes["final_error_percent"]}
-            rows.append(head | under | compared(outcome, Found(edge, edge, limit, computed)) | misses)
+    for name, one in product(SEARCHES, conditions):
+        if (name, one.set_name) in found:
+            joint = found[name, one.set_name]
+            if one.delay != "exact":
+                joint = judged(joint.point, one.both(joint.point), converging=False)
+            rows += _rows(name, one, joint)
     return pd.DataFrame(rows)
+
+
+def _rows(search: str, one: Conditions, joint: Joint) -> list[dict[str, object]]:
+    limit, output = joint.point
+    rows = []
+    for outcome, reading in zip(READINGS, joint.readings, strict=True):
+        computed, number = joint.outcomes[reading], printed_outcomes()[outcome]
+        edge = limit if abs(computed - number.value) <= number.half_unit else math.nan
+        head = {"search": search, "outcome": outcome, "reading": reading}
+        under = {"set": one.set_name, "delay": one.delay, "initial_output": output}
+        misses = {"worst_miss": joint.miss, "final_error_percent": joint.outcomes["final_error_percent"]}
+        rows.append(head | under | compared(outcome, Found(edge, edge, limit, computed)) | misses)
+    return rows

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise, product
 from typing import Any, NamedTuple
@@ -10,20 +11,16 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from experiments.runs.batch import Tick, threaded
+from experiments.runs.batch import Each, threaded
 from experiments.thesis.unprinted.chapter_2_weights import delay_free_rows, delay_free_scan
 from experiments.thesis.unprinted.chapter_4_conditions import DELAYS, SETS, Conditions, Point
 from experiments.thesis.unprinted.joint_search import together
-from experiments.thesis.unprinted.printed_outcomes import (
-    CONVERGED_PERCENT,
-    READINGS,
-    Found,
-    compared,
-    printed_outcomes,
-    where_met,
-)
+from experiments.thesis.unprinted.printed_outcomes import CONVERGED_PERCENT, OUTCOMES, READINGS, printed_outcomes
+from experiments.thesis.unprinted.where_met import Found, all_met, compared, where_met
 
 Span = tuple[Conditions, Any, Any, Any]  # with an initial output and two (limit, offset)
+Line = tuple[Conditions, str, Any, Any]  # with a kind of loop, an initial output, and limit -> outcomes
+BESIDE = 4e-5  # of a limit: farther than Pade's approximation moves where an outcome comes
 
 
 class Grid(NamedTuple):
@@ -47,9 +44,9 @@ def usual_grid() -> Grid:
 
     Above that input the limits crowd towards it: the nearer, the later the loop leaves saturation.
     """
-    scan = np.concatenate([np.linspace(0.5, 0.995, 16), 1 + np.geomspace(1e-4, 0.3, 30), np.linspace(1.35, 4.0, 46)])
-    limits = np.concatenate([[0.95, 0.98, 0.99, 0.998], 1 + np.geomspace(1e-3, 3.0, 14)])
-    return Grid(scan, limits, np.linspace(-1.0, 2.0, 25))
+    scan = np.concatenate([np.linspace(0.5, 0.995, 16), 1 + np.geomspace(1e-4, 0.3, 30), np.geomspace(1.35, 4.0, 20)])
+    limits = np.concatenate([[0.95, 0.99], 1 + np.geomspace(1e-3, 3.0, 10)])
+    return Grid(scan, limits, np.linspace(-1.0, 2.0, 13))
 
 
 def every_condition(sets: Sequence[str] = SETS, delays: Sequence[str] = DELAYS) -> list[Conditions]:
@@ -60,8 +57,15 @@ def every_condition(sets: Sequence[str] = SETS, delays: Sequence[str] = DELAYS) 
     return conditions
 
 
-def scanned(conditions: Sequence[Conditions], grid: Grid, tick: Tick = lambda: None) -> pd.DataFrame:
+def scanned(conditions: Sequence[Conditions], limits: np.ndarray, each: Each = threaded) -> pd.DataFrame:
     """Every outcome over the limit, from y(0) = 0 and from y(0) = r(0).
+
+    Parameters
+    ----------
+    conditions
+        Parameter sets with delays.
+    limits
+        As multiples of the input that the reference takes.
 
     Returns
     -------
@@ -70,15 +74,15 @@ def scanned(conditions: Sequence[Conditions], grid: Grid, tick: Tick = lambda: N
         outcome of :meth:`experiments.thesis.unprinted.chapter_4_conditions.Conditions.both`, empty for never; sorted by
         these.
     """
-    return _explored(conditions, grid.scan, np.array([0.0, 1.0]), tick)
+    return _explored(conditions, limits, np.array([0.0, 1.0]), each)
 
 
-def grid_of(conditions: Sequence[Conditions], grid: Grid, tick: Tick = lambda: None) -> pd.DataFrame:
+def grid_of(conditions: Sequence[Conditions], grid: Grid, each: Each = threaded) -> pd.DataFrame:
     """Every outcome at every limit and initial output of a grid; the columns are those of :func:`scanned`."""
-    return _explored(conditions, grid.limits, grid.outputs, tick)
+    return _explored(conditions, grid.limits, grid.outputs, each)
 
 
-def _explored(conditions: Sequence[Conditions], limits: np.ndarray, outputs: np.ndarray, tick: Tick) -> pd.DataFrame:
+def _explored(conditions: Sequence[Conditions], limits: np.ndarray, outputs: np.ndarray, each: Each) -> pd.DataFrame:
     """The outcomes at each limit and initial output, and where between two limits the lasting offset passes zero.
 
     The error converges to zero only there, on intervals that a grid would miss.
@@ -87,7 +91,7 @@ def _explored(conditions: Sequence[Conditions], limits: np.ndarray, outputs: np.
         (one, Point(float(share * one.required), float(part * one.initial_reference)))
         for one, part, share in product(conditions, outputs, limits)
     ]
-    table = _table(jobs, threaded(_both, jobs, tick))
+    table = _table(jobs, each(_both, jobs))
     spans: list[Span] = [
         (one, output, low, high)
         for one in conditions
@@ -95,8 +99,8 @@ def _explored(conditions: Sequence[Conditions], limits: np.ndarray, outputs: np.
         for low, high in pairwise(rows[["limit", "final_offset_percent"]].itertuples(index=False, name=None))
         if low[1] * high[1] < 0 and max(abs(low[1]), abs(high[1])) > CONVERGED_PERCENT
     ]
-    found = threaded(_converging, spans, tick)
-    return pd.concat([table, _table(found, threaded(_both, found, tick))], ignore_index=True).sort_values(
+    found = each(_converging, spans)
+    return pd.concat([table, _table(found, each(_both, found))], ignore_index=True).sort_values(
         ["set", "delay", "initial_output", "limit"], ignore_index=True
     )
 
@@ -138,7 +142,7 @@ def _table(jobs: Sequence[tuple[Conditions, Point]], rows: Sequence[dict[str, fl
     return pd.DataFrame([first | row for first, row in zip(head, rows, strict=True)])
 
 
-def alone(conditions: Sequence[Conditions], scan: pd.DataFrame, tick: Tick = lambda: None) -> pd.DataFrame:
+def alone(conditions: Sequence[Conditions], scan: pd.DataFrame, each: Each = threaded) -> pd.DataFrame:
     """For each outcome, reading, condition and initial output of a scan: the limits that give it, or come nearest.
 
     Returns
@@ -148,33 +152,73 @@ def alone(conditions: Sequence[Conditions], scan: pd.DataFrame, tick: Tick = lam
         limit_low, limit_high (empty: there is none), limit (the closest), computed (both empty: it never happens), miss
         (computed - printed), met (0 or 1).
     """
-    jobs: list[tuple[Conditions, str, str, Any, pd.DataFrame]] = [
-        (one, outcome, reading, output, rows)
+    jobs: list[Line] = [
+        (one, kind, output, rows.drop_duplicates("limit").set_index("limit")[list(names)].to_dict("index"))
         for one in conditions
         for output, rows in _of(scan, one).groupby("initial_output")
-        for outcome, readings in READINGS.items()
-        for reading in readings
+        for kind, names in OUTCOMES.items()
+    ]
+    return pd.DataFrame([row for rows in each(_found_on, jobs) for row in rows])
+
+
+def _found_on(line: Line) -> list[dict[str, Any]]:
+    """The rows of :func:`alone` for a loop from one initial output."""
+    one, kind, output, known = line
+
+    def run(limit: float) -> dict[str, float]:
+        return one.outcomes(kind, Point(limit, output))
+
+    readings = [(outcome, name) for outcome, names in READINGS.items() for name in names if name in OUTCOMES[kind]]
+    return [
+        _row(one, outcome, reading, output, found)
+        for outcome, reading, intervals in all_met(run, known, readings)
+        for found in intervals
     ]
 
-    def search(job: tuple[Conditions, str, str, Any, pd.DataFrame]) -> list[Found]:
-        one, outcome, reading, output, rows = job
-        kind = "thesis" if outcome == "recovery" else "none"
-        return where_met(
-            lambda limit: one.outcomes(kind, Point(limit, output))[reading],
-            rows["limit"].tolist(),
-            rows[reading].tolist(),
-            printed_outcomes()[outcome],
-        )
 
-    rows = []
-    for (one, outcome, reading, output, _), intervals in zip(jobs, threaded(search, jobs, tick), strict=True):
-        head = {"outcome": outcome, "reading": reading, "set": one.set_name, "delay": one.delay}
-        rows += [head | {"initial_output": output} | compared(outcome, found) for found in intervals]
-    return pd.DataFrame(rows)
+def _row(one: Conditions, outcome: str, reading: str, output: float, found: Found) -> dict[str, Any]:
+    under = {"set": one.set_name, "delay": one.delay, "initial_output": output}
+    return {"outcome": outcome, "reading": reading} | under | compared(outcome, found)
+
+
+def approximated(conditions: Sequence[Conditions], exact: pd.DataFrame, each: Each = threaded) -> pd.DataFrame:
+    """Where Pade's approximation moves what the exact dead time gives.
+
+    Parameters
+    ----------
+    conditions
+        Parameter sets with Pade's approximation.
+    exact
+        Of :func:`alone` for the same sets with the exact dead time.
+
+    Returns
+    -------
+    DataFrame
+        For each row of ``exact`` what is found within :data:`BESIDE` of its interval; or, where it has none, what its
+        limit gives.
+    """
+    jobs = [(one, row) for one in conditions for row in exact[exact["set"] == one.set_name].to_dict("records")]
+    return pd.DataFrame([row for rows in each(_found_beside, jobs) for row in rows])
+
+
+def _found_beside(job: tuple[Conditions, Any]) -> list[dict[str, Any]]:
+    one, row = job
+    outcome, reading, output, limit = (row[name] for name in ("outcome", "reading", "initial_output", "limit"))
+    kind = "thesis" if reading in OUTCOMES["thesis"] else "none"
+
+    def read(limit: float) -> float:
+        return one.outcomes(kind, Point(limit, output))[reading]
+
+    if not row["met"]:
+        found = Found(math.nan, math.nan, limit, math.nan if math.isnan(limit) else read(limit))
+        return [_row(one, outcome, reading, output, found)]
+    limits = [row["limit_low"] * (1 - BESIDE), limit, row["limit_high"] * (1 + BESIDE)]
+    intervals = where_met(read, limits, [read(limit) for limit in limits], printed_outcomes()[outcome])
+    return [_row(one, outcome, reading, output, found) for found in intervals]
 
 
 def conditions_tables(
-    grid: Grid | None = None, conditions: Sequence[Conditions] | None = None, tick: Tick = lambda: None
+    grid: Grid | None = None, conditions: Sequence[Conditions] | None = None, each: Each = threaded
 ) -> dict[str, pd.DataFrame]:
     """Search chapter 4's and chapter 2's conditions that are not printed.
 
@@ -184,8 +228,8 @@ def conditions_tables(
         :func:`usual_grid` unless given.
     conditions
         All four unless given.
-    tick
-        Called after every piece of work.
+    each
+        Where the pieces of work are done.
 
     Returns
     -------
@@ -198,12 +242,16 @@ def conditions_tables(
     """
     grid = grid or usual_grid()
     conditions = every_condition() if conditions is None else conditions
-    scan = scanned(conditions, grid, tick)
-    separate = alone(conditions, scan, tick).assign(search="alone")
-    joint = together(conditions, grid_of(conditions, grid, tick), tick)
+    exact, pade = ([one for one in conditions if one.delay == delay] for delay in DELAYS)
+    scan = scanned(exact, grid.scan, each)
+    separate = alone(exact, scan, each)
+    if pade:
+        scan = pd.concat([scan, scanned(pade, grid.scan[::3], each)], ignore_index=True)
+        separate = pd.concat([separate, approximated(pade, separate, each)], ignore_index=True)
+    joint = together(conditions, grid_of(exact, grid, each), each)
     sets = list(dict.fromkeys(one.set_name for one in conditions))
-    chapter_2 = delay_free_scan(sets, tick=tick)
-    summary = pd.concat([separate, joint, delay_free_rows(sets, chapter_2, tick)], ignore_index=True)
+    chapter_2 = delay_free_scan(sets, each=each)
+    summary = pd.concat([separate.assign(search="alone"), joint, delay_free_rows(sets, chapter_2)], ignore_index=True)
     columns = ["search", *(name for name in summary if name != "search")]
     both = pd.concat([scan.assign(case="extended"), chapter_2.assign(case="delay_free")], ignore_index=True)
     return {

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import pandas as pd
 from matplotlib.figure import Figure
 
-from experiments.runs.guarantee import sector_text
+from experiments.runs.words import sector_text
 from paper_figures.axis_figures.campaign import UNSURE, band, distributions
 from paper_figures.look.captions import capitalised, number, of_limits, of_run, only
 from paper_figures.look.panels import CORRECTED, NONE, THESIS

@@ -203,7 +203,7 @@ def _lines(panel: Axes, rows: pd.DataFrame, reading: str, kind: str) -> None:
         for output, part in rows[rows["set"] == name].sort_values("limit").groupby("initial_output"):
             exact, pade = part[part["delay"] != "pade"], part[part["delay"] == "pade"]
             panel.plot(exact["limit"], exact[reading], **_look(kind, int(output != 0), name))
-            panel.plot(pade["limit"][::3], pade[reading][::3], **DOTS, zorder=4)
+            panel.plot(pade["limit"], pade[reading], **DOTS, zorder=4)
 
 
 def _ratios(panel: Axes, summary: pd.DataFrame) -> None:

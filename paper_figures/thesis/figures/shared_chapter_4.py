@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import pandas as pd
 
 from data.thesis import printed_numbers
-from experiments.thesis.studies.chapter_4 import PERIODS, desaturation
+from experiments.thesis.studies.desaturation import PERIODS, desaturation
 from paper_figures.look.captions import duration, last_saturated, number, of_run
 
 MARGIN = 1.15

@@ -20,7 +20,8 @@ from identification.base.manifest import require_as_written
 from identification.model.model_file import IdentifiedModel
 from identification.model.plant import PlantModel
 from identification.sweeps.as_fitted import as_fitted
-from identification.sweeps.read_sweeps import KEPT, input_files, read_sweeps
+from identification.sweeps.input_files import input_files
+from identification.sweeps.read_sweeps import KEPT, read_sweeps
 from identification.sweeps.response import FrequencyResponse
 from paper_figures.thesis.report.of_designs import FOLLOWING
 

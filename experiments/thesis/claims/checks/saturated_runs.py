@@ -19,7 +19,8 @@ from experiments.runs.metrics import last_saturation, over_last, settling_time
 from experiments.thesis.claims.checks.statements import NOTHING, unanimous
 from experiments.thesis.claims.inputs import Inputs, plant_of
 from experiments.thesis.printed_choices import chapter_4, thesis_reference
-from experiments.thesis.studies.chapter_4 import PERIODS, extended_tables
+from experiments.thesis.studies.chapter_4 import extended_tables
+from experiments.thesis.studies.desaturation import PERIODS
 from experiments.thesis.studies.pid import BACK_CALCULATION, HORIZON_S, STEP, pid_loop, pid_tables, printed_benchmark
 
 BACK_CALCULATIONS = (BACK_CALCULATION, 100 * BACK_CALCULATION)  # in 1/s
