@@ -8,6 +8,7 @@ from identification.base.arrays import Array
 from identification.base.compiled import njit
 
 MOST = 60  # degree
+GROWTH = 4.0  # times its largest value so far
 JUMP = 1e-9  # a control that is further than this share beyond a limit has jumped there
 
 
@@ -177,11 +178,19 @@ def leaves_mode(
 
 
 @njit(nogil=True)
-def stays(U: Array, degree: int, mode: int, low: float, high: float) -> bool:
-    """Whether a bound says that a control sum U_i tau^i stays in its mode for -1 <= tau <= 1."""
-    swing = 0.0
-    for i in range(1, degree + 1):
-        swing += abs(U[i])
-    if mode == 0:
-        return bool(low < U[0] - swing and U[0] + swing < high)
-    return bool(U[0] - swing > high if mode > 0 else U[0] + swing < low)
+def stays(P: Array, degree: int, size: Array, mode: int, low: float, high: float) -> bool:
+    """Whether the control, row 0 of P, stays in its mode for -1 <= tau <= 1, and no signal grows beyond ``size`` much.
+
+    Bounds decide. Where a signal grows, its first values would have the rounding of its last ones.
+    """
+    for s in range(len(P)):
+        swing = 0.0
+        for i in range(1, degree + 1):
+            swing += abs(P[s, i])
+        if abs(P[s, 0]) + swing > GROWTH * size[s]:
+            return False
+        if s == 0 and mode == 0 and not (low < P[0, 0] - swing and P[0, 0] + swing < high):
+            return False
+        if s == 0 and mode != 0 and not (P[0, 0] - swing > high if mode > 0 else P[0, 0] + swing < low):
+            return False
+    return True

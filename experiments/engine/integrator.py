@@ -83,7 +83,7 @@ def integrate(
     lows = lowest_rows(n, k, wide, lanes)
     coefficients, rounding, states = np.zeros((most + 1) * lanes), np.zeros(lanes), np.zeros(gains.shape[2])
     terms, later, negligible = np.zeros(n), np.zeros(n), np.zeros(1 + k)
-    U, V = P[0], np.zeros((most + 1, n + 1 + k))
+    before, U, V = np.zeros(1 + k), P[0], np.zeros((most + 1, n + 1 + k))
     V[0, :n], V[0, n] = x0, min(max(0.0, low), high)
     rest = np.array([times(indptr, indices, data, n + 1 + j, V, 0) for j in range(k)])
     remembered = Past(starts, lates, aheads, degrees, history, rest, queue)
@@ -115,6 +115,8 @@ def integrate(
             break
         ahead = 0.0 if slews or some_brief or kink or on_limit != 0 or standing > 0 or single > 0 else 1.0
         single = max(single - 1, 0)
+        for s in range(1 + k):
+            before[s] = size[s]
         while True:
             length = (1.0 + ahead) * step
             t_next = min(t + length, horizon)
@@ -203,8 +205,10 @@ def integrate(
                 known = filled.max()
                 if trial == endings.TRIALS - 1:
                     status = endings.UNSETTLED
-            if ahead > 0 and (degree == most or not stays(U, degree, mode, low, high)):
+            if ahead > 0 and (degree == most or not stays(P, degree, size, mode, low, high)):
                 ahead, single = 0.0, 2
+                for s in range(1 + k):
+                    size[s] = before[s]
                 continue
             break
         if status == endings.UNSETTLED:
