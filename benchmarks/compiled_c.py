@@ -71,7 +71,7 @@ def straight_code(loop: CompiledLoop) -> str:
     """
     n, k, watched = len(loop.x0), len(loop.delays), len(loop.reads)
     free, limited = (_dense(rows, n + 1 + k) for rows in (loop.unsaturated, loop.saturated))
-    most = loop.tables.terms.shape[0] // len(loop.tables.gains) - 1
+    most = loop.tables.polynomials.shape[1] // len(loop.unsaturated.indptr[n + 1 :]) - 1
     lines = [f"#define {name} {value}" for name, value in (("N", n), ("K", k), ("WATCHED", watched), ("MOST", most))]
     for mode, rows in enumerate((free, limited)):
         rates = []

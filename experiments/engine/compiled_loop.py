@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.engine.saturated_loop import SaturatedLoop
-from experiments.engine.step_table import Rows, Tables, compressed, tabulate
+from experiments.engine.step_table import Rows, Tables, compressed, tabulate, whole_lanes
 from identification.base.errors import InputError
 
 FURTHEST = 4.0  # fastest root times step: the terms of a series grow to exp of it, and two digits are lost
@@ -68,11 +68,10 @@ def compile_loop(
     """Merge the delayed signals that enter the loop alike, choose the step, and tabulate it.
 
     The step is set by the fastest eigenvalue of the loop, saturated or not, and by the shortest dead time that is not
-    brief, of which it is a whole part: then most delayed polynomials are read where they start. Without a rate limit
-    and brief dead times it is an even part, for steps twice as long. It is halved until all series end. A dead time is
-    brief up to ``most_brief`` time constants of the fastest eigenvalue: the loop is taken without it, and what it
-    changes is found in each step. Where nothing sets a step, ``idle_step`` seconds are one. ``slews`` says that the
-    last two states are those of an actuator with a rate limit.
+    brief, of which it is a whole part: then most delayed polynomials are read where they start. It is halved until all
+    series end. A dead time is brief up to ``most_brief`` time constants of the fastest eigenvalue: the loop is taken
+    without it, and what it changes is found in each step. Where nothing sets a step, ``idle_step`` seconds are one.
+    ``slews`` says that the last two states are those of an actuator with a rate limit.
     """
     now, direct = loop.delays == 0, _direct(loop)
     if np.any(loop.E[now] @ direct[now] != 0):
@@ -115,8 +114,7 @@ def compile_loop(
     step = min(FURTHEST / fastest if fastest > 0 else np.inf, most_step)
     if not brief.all():
         shortest = float(delays[~brief].min())
-        even = 1 if slews or brief.any() else 2  # so that steps twice as long are parts of it, too
-        step = shortest / (even * max(np.ceil(shortest / (even * step)), 1.0))
+        step = shortest / max(np.ceil(shortest / step), 1.0)
     elif np.isinf(step):
         step = idle_step  # of integrators alone, whose series end by themselves
     while True:
@@ -124,13 +122,12 @@ def compile_loop(
         if all(degree >= 0 for _, degree in tabulated):
             break
         step /= 2
-    tables = Tables(*(_stacked(alike) for alike in zip(*(each for each, _ in tabulated), strict=True)))
     return CompiledLoop(
         unsaturated=unsaturated,
         saturated=saturated,
         slewing=modes[-2],
         stopped=modes[-1],
-        tables=tables._replace(terms=tables.terms.reshape(-1, *tables.terms.shape[2:])),
+        tables=Tables(*(_stacked(alike) for alike in zip(*(tables for tables, _ in tabulated), strict=True))),
         delays=delays,
         brief=brief,
         x0=loop.x0,
@@ -210,8 +207,9 @@ def _each_once(delayed: np.ndarray, watched: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _stacked(tables: Sequence[np.ndarray]) -> np.ndarray:
-    """Tables on one another, filled with zeros to one size."""
-    stack = np.zeros((len(tables), *np.max([table.shape for table in tables], axis=0)))
+    """Tables on one another, filled with zeros to one size and to whole lanes."""
+    rows, columns = np.max([table.shape for table in tables], axis=0)
+    stack = np.zeros((len(tables), rows, whole_lanes(columns)))
     for into, table in zip(stack, tables, strict=True):
-        into[tuple(slice(size) for size in table.shape)] = table
+        into[: table.shape[0], : table.shape[1]] = table
     return stack

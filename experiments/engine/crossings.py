@@ -8,7 +8,6 @@ from identification.base.arrays import Array
 from identification.base.compiled import njit
 
 MOST = 60  # degree
-GROWTH = 4.0  # times its largest value so far
 JUMP = 1e-9  # a control that is further than this share beyond a limit has jumped there
 
 
@@ -175,22 +174,3 @@ def leaves_mode(
             jumped = -g[0] > JUMP * (abs(limit) + abs(U[0]))
             best, entered, crossed = found, (side if mode == 0 else 0), (0 if jumped else side)
     return best, entered, crossed
-
-
-@njit(nogil=True)
-def stays(P: Array, degree: int, size: Array, mode: int, low: float, high: float) -> bool:
-    """Whether the control, row 0 of P, stays in its mode for -1 <= tau <= 1, and no signal grows beyond ``size`` much.
-
-    Bounds decide. Where a signal grows, its first values would have the rounding of its last ones.
-    """
-    for s in range(len(P)):
-        swing = 0.0
-        for i in range(1, degree + 1):
-            swing += abs(P[s, i])
-        if abs(P[s, 0]) + swing > GROWTH * size[s]:
-            return False
-        if s == 0 and mode == 0 and not (low < P[0, 0] - swing and P[0, 0] + swing < high):
-            return False
-        if s == 0 and mode != 0 and not (P[0, 0] - swing > high if mode > 0 else P[0, 0] + swing < low):
-            return False
-    return True

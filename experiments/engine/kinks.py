@@ -13,12 +13,6 @@ from identification.base.compiled import njit
 
 BEYOND = 0.5  # of a step: how far beyond its end, where no kink is, the polynomial of a cut step is read
 
-NODES = np.cos(math.pi * (np.arange(24, 0, -1) - 0.5) / 24)  # of Chebyshev, upwards
-TO_SERIES = np.cos(np.outer(np.arange(24), np.arccos(NODES))) / np.where(np.arange(24) > 0, 12.0, 24.0)[:, None]
-TO_POWERS = np.zeros((24, 24))
-for _i in range(24):
-    TO_POWERS[_i, : _i + 1] = np.polynomial.chebyshev.cheb2poly(np.eye(24)[_i])[: _i + 1]
-
 FACTORIAL = np.array([math.factorial(i) for i in range(MOST + 1)], dtype=float)
 INVERSE = 1 / FACTORIAL
 
@@ -28,9 +22,8 @@ class Past(NamedTuple):
 
     Parameters
     ----------
-    starts, lates, aheads, degrees, history
-        Shapes (room,), and (room, k, most + 1) of the coefficients: a step starts at ``starts`` + ``lates`` seconds,
-        and its polynomials ``aheads`` steps later: where it is twice as long as others, in its middle.
+    starts, lates, degrees, history
+        Shapes (room,), and (room, k, most + 1) of the coefficients: a step starts at ``starts`` + ``lates`` seconds.
     rest
         Shape (k,): the sources before zero.
     queue
@@ -39,7 +32,6 @@ class Past(NamedTuple):
 
     starts: Array
     lates: Array
-    aheads: Array
     degrees: Array
     history: Array
     rest: Array
@@ -106,14 +98,13 @@ def images(
 
     None is where the two sides of the kink agree to what is ``negligible`` (1 + k,), as far as they are read.
     """
-    starts, lates, aheads, degrees, history, rest, queue = past
+    starts, lates, degrees, history, rest, queue = past
     this, left = pieces & (len(starts) - 1), (pieces - 1) & (len(starts) - 1)
     t = starts[this]
     for j in range(len(delays)):
         W[0], before, moved = rest[j], 0, 0.0
         if pieces > 0:
-            before = degrees[left]
-            moved = (t - starts[left] + (lates[this] - lates[left])) / step - aheads[left]
+            before, moved = degrees[left], (t - starts[left] + (lates[this] - lates[left])) / step
             for i in range(before + 1):
                 W[i] = history[left, j, i]
         read = delays[j] / step if brief[j] else BEYOND
@@ -133,60 +124,3 @@ def drop(queue: Array, queued: int, until: float) -> int:
         for q in range(queued):
             queue[q] = queue[q + passed]
     return queued
-
-
-@njit(nogil=True)
-def across(
-    starts: Array, lates: Array, aheads: Array, degrees: Array, history: Array, rest: Array, j: int, piece: int,
-    pieces: int, start: float, late: float, step: float, negligible: float, work: Array, W: Array,
-) -> int:  # fmt: skip
-    """Fill W with one polynomial for two steps of a past signal, from ``start`` + ``late`` on and about their middle.
-
-    It interpolates the pieces in Chebyshev's nodes, and its series is cut off where it is ``negligible``. Returns its
-    degree, or -1 where the series does not become so: the past has a kink there. ``piece`` is one near the start.
-    """
-    wrap = len(starts) - 1
-    while piece > 0 and starts[piece & wrap] > start:
-        piece -= 1
-    for m in range(len(NODES)):
-        at = start + (1.0 + NODES[m]) * step
-        while piece + 1 < pieces and starts[(piece + 1) & wrap] <= at:
-            piece += 1
-        this = piece & wrap
-        value = rest[j]
-        if at >= 0:
-            tau = (start - starts[this] + (late - lates[this])) / step + (1.0 + NODES[m] - aheads[this])
-            value = 0.0
-            for i in range(degrees[this], -1, -1):
-                value = value * tau + history[this, j, i]
-        work[0, m] = value
-    degree = 0
-    for i in range(len(NODES)):
-        work[1, i] = 0.0
-        for m in range(len(NODES)):
-            work[1, i] += TO_SERIES[i, m] * work[0, m]
-        if abs(work[1, i]) > negligible:
-            degree = i
-    for power in range(degree + 1):
-        W[power] = 0.0
-        for i in range(power, degree + 1):
-            W[power] += work[1, i] * TO_POWERS[i, power]
-    return degree if degree < len(NODES) - 3 else -1
-
-
-@njit(nogil=True)
-def read_piece(
-    starts: Array, lates: Array, aheads: Array, radii: Array, degrees: Array, history: Array, j: int, piece: int,
-    start: float, late: float, delay: float, t_next: float, step: float, work: Array, W: Array,
-) -> tuple[int, float]:  # fmt: skip
-    """Fill W with a piece of the past, seen from ``start``; its degree, and ``t_next`` or where the piece ends."""
-    end = starts[piece] + (aheads[piece] + radii[piece]) * step + delay
-    if end < t_next - 1e-9 * step:
-        t_next = end
-    degree = int(degrees[piece])
-    for i in range(degree + 1):
-        W[i] = history[piece, j, i]
-    moved = start - starts[piece] + (late - lates[piece]) - aheads[piece] * step
-    if abs(moved) > 4e-16 * (step + start + delay):  # else the same time, to rounding
-        shift(W, degree, moved / step, work)
-    return degree, t_next

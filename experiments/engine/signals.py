@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from experiments.engine.kinks import shift
-from experiments.engine.step_table import NEGLIGIBLE, NOTHING, ROUNDING, add_columns
+from experiments.engine.step_table import NEGLIGIBLE, NOTHING, ROUNDING, Tables, dot, whole_lanes
 from identification.base.arrays import Array
 from identification.base.compiled import njit
 
@@ -13,54 +11,19 @@ AT_ONCE = 8  # samples
 
 
 @njit(nogil=True)
-def lowest_rows(n: int, k: int, columns: int, signals: int) -> Array:
-    """The first row of each column of the polynomials that is not zero: w_i moves the coefficients from degree i on."""
-    lows = np.zeros(columns, np.uint64)
-    for c in range(n + 1, columns):
-        lows[c] = (c - n - 1) // k * signals
-    return lows
-
-
-@njit(nogil=True, inline="always")
-def find_used(z: Array, columns: int, sizes: Array, used: Array) -> int:
-    """Put where the first ``columns`` of z are not zero into ``used``, and their sizes; how many there are."""
-    count = 0
-    for c in range(columns):
-        sizes[c] = abs(z[c])
-        if z[c] != 0.0:
-            used[count] = c
-            count += 1
-    return count
-
-
-@njit(nogil=True, inline="always")
-def gain(gains: Array, which: int, z: Array, used: Array, count: int, none: Array, states: Array, x: Array) -> None:
-    """Add to x what it gains in a whole step."""
-    for r in range(len(states)):
-        states[r] = 0.0
-    add_columns(gains, which, used, count, z, none, 0, len(states), states)
-    for r in range(len(x)):
-        x[r] += states[r]
-
-
-@njit(nogil=True, inline="always")
-def state_terms(
-    terms: Array, table: int, z: Array, used: Array, count: int, none: Array, states: Array, size: Array
-) -> None:
+def state_terms(tables: Tables, which: int, degree: int, z: Array, columns: int, size: Array) -> None:
     """Fill size (n,) with the absolute values of x's coefficients of one degree."""
-    for r in range(len(states)):
-        states[r] = 0.0
-    add_columns(terms, table, used, count, z, none, 0, len(states), states)
-    for r in range(len(size)):
-        size[r] = abs(states[r])
+    n = len(size)
+    for r in range(n):
+        size[r] = abs(dot(tables.terms, which, n * degree + r, z, columns))
 
 
 @njit(nogil=True, fastmath={"contract", "reassoc"})
-def following(influence: Array, which: int, signal: int, degree: int, size: Array) -> float:
+def following(tables: Tables, which: int, signal: int, degree: int, terms: Array) -> float:
     """A bound on all coefficients of a signal beyond a degree, which :func:`state_terms` of that degree gives."""
     value = 0.0
-    for r in range(len(size)):
-        value += influence[which, signal, r] * size[r]
+    for r in range(len(terms)):
+        value += tables.influence[which, signal, r] * terms[r]
     return value / (degree + 1)
 
 
@@ -117,154 +80,92 @@ def change(
     return difference
 
 
-@njit(nogil=True, inline="always")
+@njit(nogil=True)
 def unfold(
-    polynomials: Array, terms: Array, magnitudes: Array, influence: Array, which: int, k: int, z: Array, sizes: Array,
-    used: Array, lows: Array, none: Array, known: int, radius: float, usual: int, size: Array, negligible: Array,
-    coefficients: Array, bounds: Array, states: Array, P: Array, last: Array,
-) -> tuple[int, float, int, int]:  # fmt: skip
+    tables: Tables, which: int, k: int, z: Array, sizes: Array, known: int, radius: float, usual: int, size: Array,
+    negligible: Array, P: Array, terms: Array,
+) -> tuple[int, float]:  # fmt: skip
     """Fill P (1 + k, most + 1) with the coefficients of u and Z x until all that follow are negligible up to a radius.
 
     Parameters
     ----------
-    polynomials, terms, magnitudes, influence, which
-        Of all modes, and the mode's.
+    tables, which
+        Of both modes, and the mode's.
     z, known, radius
         What the step begins with, the highest degree of a delayed signal in it, and how many steps far the polynomials
         are read.
-    sizes, used, lows, none
-        Filled with abs(z), and with where z is not zero; of :func:`lowest_rows`, and zeros.
     usual
         The last step's degree, below which the end is not looked for.
-    size, negligible
-        The largest values of the signals so far, and what is negligible beside them; filled.
-    coefficients, bounds, last
-        Filled with the coefficients of all signals, degree by degree, with bounds on their sizes together, and with the
-        absolute values of x's coefficients of the last degree.
-    states
-        Room for as many numbers as x has lanes.
+    sizes, size, negligible, terms
+        Filled with abs(z), the largest values of the signals so far, what is negligible beside them, and the absolute
+        values of x's coefficients of the last degree.
 
     Returns
     -------
-    degree, power, made, count
-        Of the last coefficient, and radius to that power; of ``coefficients`` those below the degree ``made`` are
-        filled; ``count`` of ``used`` are.
+    degree, power
+        Of the last coefficient, and radius to that power.
     """
-    n, most, signals = len(last), P.shape[1] - 1, len(bounds)
-    count = find_used(z, n + 1 + k * (known + 1), sizes, used)
-    for s in range(signals):
-        bounds[s] = 0.0
-    add_columns(magnitudes, which, used, count, sizes, none, 0, signals, bounds)
-    quiet, power, made = 0, 1.0, 0
+    n, signals, most = len(terms), tables.magnitudes.shape[1], P.shape[1] - 1
+    columns = whole_lanes(n + 1 + k * (known + 1))
+    for i in range(columns):
+        sizes[i] = abs(z[i])
+    for s in range(1 + k):
+        negligible[s] = ROUNDING * dot(tables.magnitudes, which, s, sizes, columns)
+    quiet, power = 0, 1.0
     for degree in range(most + 1):
         small = degree > known
-        if degree == made:
-            made = 1 + min(max(usual, known + 2, degree + 1), most)
-            for r in range(degree * signals, made * signals):
-                coefficients[r] = 0.0
-            add_columns(
-                polynomials, which, used, count, z, lows, degree * signals, made * signals, coefficients
-            )  # fmt: skip
+        upto = columns if small else whole_lanes(n + 1 + k * (degree + 1))  # of the causes of this degree
         for s in range(1 + k):
-            c = coefficients[signals * degree + s]
+            c = dot(tables.polynomials, which, signals * degree + s, z, upto)
             if degree == 0:
                 size[s] = max(size[s], abs(c))
-                negligible[s] = max(NEGLIGIBLE * size[s], ROUNDING * bounds[s])
+                negligible[s] = max(NEGLIGIBLE * size[s], negligible[s])
             P[s, degree] = c if abs(c) > NOTHING * size[s] else 0.0
             small = small and abs(c) * power <= negligible[s]
         quiet = quiet + 1 if small else 0
         if quiet > 1 and degree >= usual - 1:  # what follows may be negligible; most steps end as the last one did
-            state_terms(terms, which * (most + 1) + degree, z, used, count, none, states, last)
+            state_terms(tables, which, degree, z, columns, terms)
             for s in range(1 + k):
-                small = small and following(influence, which, s, degree, last) * power <= negligible[s]
+                small = small and following(tables, which, s, degree, terms) * power <= negligible[s]
             if small:
-                return degree, power, made, count
+                return degree, power
         power *= radius
-    for r in range(n):
-        last[r] = 0.0  # what the tables leave out is below rounding
-    return most, power / radius, made, count
-
-
-@njit(nogil=True, inline="always")
-def expand(
-    polynomials: Array, terms: Array, influence: Array, which: int, signal: int, z: Array, used: Array, count: int,
-    lows: Array, none: Array, degree: int, made: int, most: int, coefficients: Array, bounds: Array, states: Array,
-    last: Array, later: Array, size: Array, shown: Array, o: int,
-) -> tuple[int, int]:  # fmt: skip
-    """Fill shown[o] with a signal's coefficients until all that follow are negligible against its ``size`` so far.
-
-    Beyond ``degree``, of which ``last`` holds the absolute values of x's coefficients, delayed signals have none;
-    ``later`` (n,) is room for those of higher degrees. Returns the degree, and to which ``coefficients`` are made.
-    """
-    signals = len(bounds)
-    size[signal] = max(size[signal], abs(coefficients[signal]))
-    negligible = max(NEGLIGIBLE * size[signal], ROUNDING * bounds[signal])
-    bound = following(influence, which, signal, degree, last)
-    while degree < most and bound > negligible:
-        degree += 1
-        state_terms(terms, which * (most + 1) + degree, z, used, count, none, states, later)
-        bound = following(influence, which, signal, degree, later)
-    if degree >= made:
-        for r in range(made * signals, (degree + 1) * signals):
-            coefficients[r] = 0.0
-        add_columns(
-            polynomials, which, used, count, z, lows, made * signals, (degree + 1) * signals, coefficients
-        )  # fmt: skip
-        made = degree + 1
-    for i in range(degree + 1):
-        shown[o, i] = coefficients[signals * i + signal]
-    left_out = abs(shown[o, degree])
-    while degree > 0 and left_out <= ROUNDING * size[signal]:
-        degree -= 1
-        left_out += abs(shown[o, degree])
-    return degree, made
+    terms[:] = 0.0  # what the tables leave out is below rounding
+    return most, power / radius
 
 
 @njit(nogil=True, fastmath={"contract"})
-def evaluate(shown: Array, o: int, degree: int) -> None:
-    """Fill the last row of ``shown`` with the polynomial of row o at AT_ONCE times, which are in the row before."""
-    taus, found = len(shown) - 2, len(shown) - 1
+def evaluate(shown: Array, o: int, degree: int, taus: Array, found: Array) -> None:
+    """Fill found (AT_ONCE,) with the polynomial shown[o] of a degree at ``taus``."""
     for q in range(AT_ONCE):
-        shown[found, q] = shown[o, degree]
+        found[q] = shown[o, degree]
     for i in range(degree - 1, -1, -1):
         for q in range(AT_ONCE):
-            shown[found, q] = shown[found, q] * shown[taus, q] + shown[o, i]
+            found[q] = found[q] * taus[q] + shown[o, i]
 
 
 @njit(nogil=True)
-def read_samples(
-    polynomials: Array, terms: Array, influence: Array, which: int, groups: Array, reads: Array, z: Array, used: Array,
-    count: int, lows: Array, none: Array, degree: int, made: int, most: int, coefficients: Array, bounds: Array,
-    states: Array, last: Array, later: Array, size: Array, shown: Array, tops: Array, U: Array, samples: Array,
-    sample: Array, t: float, late: float, ahead: float, step: float, until: float, values: Array,
-) -> None:  # fmt: skip
-    """Fill values at the samples before ``until``, and count them in ``sample``, the next of each group.
+def expand(
+    tables: Tables, which: int, signal: int, signals: int, z: Array, sizes: Array, columns: int, degree: int, most: int,
+    terms: Array, later: Array, size: Array, at: int, shown: Array, o: int,
+) -> int:  # fmt: skip
+    """Fill shown[o] with a signal's coefficients until all that follow are negligible against its ``size[at]`` so far.
 
-    Row 0 is u; of the others :func:`expand` makes the polynomials. The two last rows of ``shown`` are room.
+    ``sizes`` is abs(z); ``terms`` holds the absolute values of x's coefficients of the given ``degree``, beyond which
+    delayed signals have none; ``later`` (n,) is room for those of higher degrees. Returns the degree.
     """
-    for g in range(len(samples)):
-        begin = end = sample[g]
-        while end < samples.shape[1] and samples[g, end] < until:
-            end += 1
-        if end == begin:
-            continue
-        sample[g] = end
-        first = 0 if g == 0 else 1 + groups[g]
-        for o in range(first, 1 + groups[g + 1]):
-            if o == 0:
-                tops[o] = degree
-                for i in range(degree + 1):
-                    shown[o, i] = U[i]
-            else:
-                tops[o], made = expand(
-                    polynomials, terms, influence, which, reads[o - 1], z, used, count, lows, none, degree, made, most,
-                    coefficients, bounds, states, last, later, size, shown, o,
-                )  # fmt: skip
-        for at in range(begin, end, AT_ONCE):
-            several = min(AT_ONCE, end - at)
-            for q in range(several):
-                shown[len(shown) - 2, q] = (samples[g, at + q] - t - late) / step - ahead
-            for o in range(first, 1 + groups[g + 1]):
-                evaluate(shown, o, tops[o])
-                for q in range(several):
-                    values[o, at + q] = shown[len(shown) - 1, q]
+    for i in range(degree + 1):
+        shown[o, i] = dot(tables.polynomials, which, signals * i + signal, z, columns)
+    size[at] = max(size[at], abs(shown[o, 0]))
+    negligible = max(NEGLIGIBLE * size[at], ROUNDING * dot(tables.magnitudes, which, signal, sizes, columns))
+    bound = following(tables, which, signal, degree, terms)
+    while degree < most and bound > negligible:
+        degree += 1
+        shown[o, degree] = dot(tables.polynomials, which, signals * degree + signal, z, columns)
+        state_terms(tables, which, degree, z, columns, later)
+        bound = following(tables, which, signal, degree, later)
+    left_out = abs(shown[o, degree])
+    while degree > 0 and left_out <= ROUNDING * size[at]:
+        degree -= 1
+        left_out += abs(shown[o, degree])
+    return degree

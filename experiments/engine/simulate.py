@@ -223,7 +223,7 @@ def _require_affordable(compiled: CompiledLoop, room: int, horizon: float) -> No
         if step > shortest / 2
         else (f"a root of the loop near {FURTHEST / step:.3g} rad/s asks for")
     )
-    if room * compiled.tables.gains.shape[1] > MOST_ROOM:
+    if room * compiled.tables.increments.shape[2] > MOST_ROOM:
         raise InputError(
             f"{asked} steps of {step:.3g} s, too many to remember in the longest dead time, "
             f"{compiled.delays.max():.3g} s; expected dead times that differ less, or a slower design"

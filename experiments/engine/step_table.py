@@ -28,36 +28,29 @@ ROUNDING = 1e-16
 NEGLIGIBLE = 1e-14  # a term, relative to the largest value of its signal so far
 NOTHING = 1e-30  # what is smaller than this share of the largest value of its signal so far is zero
 LEAST = 24  # degree: delayed polynomials may be of higher degree than the responses
-LANES = 8  # rows of a table are filled up to a multiple of so many
+LANES = 16  # products of rows are taken in multiples of so many columns
 
 
 class Tables(NamedTuple):
-    """A step as tables, each of one loop, or with a leading axis of the modes.
-
-    A table is laid out by columns, one for each entry of z = (x_0, m, w_0, w_1, ...): a product with z is a sum of
-    columns, which takes whole lanes at once and leaves out what is zero. States and signals are filled up to lanes.
+    """A step as tables, each of one loop, or with a leading axis of the unsaturated and the saturated one.
 
     Parameters
     ----------
-    gains
-        Shape (columns, states): times z, what x gains in the step. The gain and not the end: the rounding of its
-        entries, the same at every step, is small where x is slow.
-    centres
-        Shape (columns, states): times z = (x(-1), m, w_0, w_1, ...), what x gains from tau = -1 to 0.
+    increments
+        Shape (n, columns): times z = (x_0, m, w_0, w_1, ...), what x gains in the step. The gain and not the end: the
+        rounding of its entries, the same at every step, is small where x is slow.
     polynomials
-        Shape (columns, (degree + 1) signals): times z, the signals' coefficients, those of degree 0 first.
+        Shape (signals (degree + 1), columns): times z, the signals' coefficients, those of degree 0 first.
     terms
-        Shape (degree + 1, columns, states): times z, the coefficients of x of each degree; of several modes one after
-        the other along the first axis.
+        Shape (n (degree + 1), columns): times z, the coefficients of x, likewise.
     magnitudes
-        Shape (columns, signals): times abs(z), what bounds the absolute values of a signal's coefficients together.
+        Shape (signals, columns): times abs(z), what bounds the absolute values of a signal's coefficients together.
     influence
-        Shape (signals + n, n), not filled up: times |x_p|/(p + 1), what bounds together all coefficients of the
-        signals, and of x, of degrees beyond p, where m and w have none beyond p - 1.
+        Shape (signals + n, n): times |x_p|/(p + 1), what bounds together all coefficients of the signals, and of x, of
+        degrees beyond p, where m and w have none beyond p - 1.
     """
 
-    gains: Array
-    centres: Array
+    increments: Array
     polynomials: Array
     terms: Array
     magnitudes: Array
@@ -95,34 +88,12 @@ def whole_lanes(count: int) -> int:
 
 
 @njit(nogil=True, fastmath={"contract", "reassoc"})
-def add_columns(
-    tables: Array, which: int, columns: Array, count: int, z: Array, lows: Array, low: int, high: int, y: Array
-) -> None:
-    """Add to y[low : high] the first ``count`` of ``columns`` of one of some tables times those entries of z.
-
-    Column c is zero before row ``lows[c]``, which does not fall from one column to the next. All indices are unsigned,
-    so that none is tested for a count from the end.
-    """
-    one, four, begin, end, i, t = (
-        np.uint64(1),
-        np.uint64(4),
-        np.uint64(low),
-        np.uint64(high),
-        np.uint64(0),
-        np.uint64(which),
-    )
-    while i + four <= np.uint64(count):
-        a, b, c, d = columns[i], columns[i + one], columns[i + one + one], columns[i + four - one]
-        z_a, z_b, z_c, z_d = z[a], z[b], z[c], z[d]
-        for r in range(max(begin, lows[a]), end):
-            y[r] += (tables[t, a, r] * z_a + tables[t, b, r] * z_b) + (tables[t, c, r] * z_c + tables[t, d, r] * z_d)
-        i += four
-    while i < np.uint64(count):
-        a = columns[i]
-        z_a = z[a]
-        for r in range(max(begin, lows[a]), end):
-            y[r] += tables[t, a, r] * z_a
-        i += one
+def dot(table: Array, which: int, row: int, z: Array, count: int) -> float:
+    """The first ``count`` entries of a row of one of two tables times those of z."""
+    value = 0.0
+    for c in range(count):
+        value += table[which, row, c] * z[c]
+    return value
 
 
 @njit(nogil=True)
@@ -186,35 +157,26 @@ def tabulate(rows: Rows, n: int, k: int, step: float) -> tuple[Tables, int]:
     for p in range(1, degree + 1):
         influence[:signals] += np.abs(outputs[p, :, :n])
     polynomials, terms = _laid_out(outputs, degree, n, k), _laid_out(responses[:, :n], degree, n, k)
-    gains, magnitudes = np.zeros(terms.shape[1:]), np.zeros(polynomials.shape[1:])
+    increments, magnitudes = np.zeros((n, terms.shape[1])), np.zeros((signals, terms.shape[1]))
     for p in range(degree, -1, -1):  # the small terms first
-        magnitudes += np.abs(polynomials[p])
+        magnitudes += np.abs(polynomials[signals * p : signals * (p + 1)])
         if p > 0:
-            gains += terms[p]
-    centres = gains.copy()
-    for c in range(n + 1, len(centres)):
-        i, j = (c - n - 1) // k, (c - n - 1) % k
-        for r in range(n):
-            centres[c, r] = 0.0
-            for p in range(degree, 0, -1):
-                centres[c, r] += p * responses[p, r, n + 1 + j] / (p + i)
-            centres[c, r] *= (-1.0) ** i
-    by_column = polynomials.transpose(1, 0, 2).copy().reshape(polynomials.shape[1], -1)
-    return Tables(gains, centres, by_column, terms, magnitudes, influence), degree
+            increments += terms[n * p : n * (p + 1)]
+    return Tables(increments, polynomials, terms, magnitudes, influence), degree
 
 
 @njit(nogil=True)
 def _laid_out(responses: Array, degree: int, n: int, k: int) -> Array:
-    """Responses (p, rows, n + 1 + k) to x_0, m and w_0 by degree and column of z; w_i has its i degrees later."""
+    """Responses (p, rows, n + 1 + k) to x_0, m and w_0 as rows over z, by degree; w_i has its i degrees later."""
     rows = responses.shape[1]
-    table = np.zeros((degree + 1, n + 1 + k * (degree + 1), whole_lanes(rows)))
+    table = np.zeros((rows * (degree + 1), n + 1 + k * (degree + 1)))
     for p in range(degree + 1):
         for r in range(rows):
             for c in range(n + 1):
-                table[p, c, r] = responses[p, r, c]
+                table[rows * p + r, c] = responses[p, r, c]
             for i in range(p + 1):
                 for j in range(k):
-                    table[p, n + 1 + k * i + j, r] = responses[p - i, r, n + 1 + j] / BINOMIAL[p, i]
+                    table[rows * p + r, n + 1 + k * i + j] = responses[p - i, r, n + 1 + j] / BINOMIAL[p, i]
     return table
 
 
@@ -274,17 +236,3 @@ def advance(
             negligible = bound * power * reach <= (i + 2) * NEGLIGIBLE * scale[r]
         if negligible:
             break
-
-
-@njit(nogil=True)
-def cut_short(
-    rows: Rows, influence: Array, V: Array, z: Array, n: int, k: int, known: int, matter: int, most: int, scale: Array,
-    step: float, reach: float, x: Array,
-) -> None:  # fmt: skip
-    """:func:`advance` from z, whose delayed signals are ``known`` to a degree and ``matter`` to one; V is room."""
-    V[0, : n + 1] = z[: n + 1]
-    for i in range(known + 1):
-        for j in range(k):
-            V[i, n + 1 + j] = z[n + 1 + k * i + j]
-    advance(rows, influence, V, n, matter, most, scale, step, reach, x)
-    V[: known + 1, n + 1 :] = 0.0
