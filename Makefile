@@ -94,7 +94,7 @@ $(READY): requirements.lock pyproject.toml
 	$(PY) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --no-index --editable .
 	@touch $@
 
-# Compiled code is kept in the user's cache folder; once it is there, no command waits for it.
+# Compiled code is kept in the user's cache folder; here is what takes long to compile.
 $(COMPILED): $(READY) $(shell grep -rsl --include=*.py @njit identification design experiments)
 	@$(PY) -m antiwindup.compile_ahead
 	@touch $@

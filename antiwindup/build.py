@@ -23,6 +23,7 @@ from identification.base.folder_lock import locked_folder
 from identification.base.partial_files import partial_file
 
 REFUSED, USAGE = "Error: ", "Usage: "
+LOST = 255  # what multiprocessing says of a process whose fork server is gone
 
 Tell = Callable[[int, Sequence[str]], object]
 """Called before each wait, with the number of steps that have ended and the names of those that run."""
@@ -208,6 +209,9 @@ class Build:
             self._remove(self._after([step]))
             if is_refusal:
                 raise InputError(sentence)
+            if ended.process.exitcode == LOST:
+                lost = f"{step.name}: was ended with the process that it was forked from"
+                raise InputError(f"{lost}; the same command goes on from what is done")
             if (status := ended.process.exitcode or 0) < 0:
                 raise InputError(
                     f"{step.name}: was ended by signal {-status}; the same command goes on from what is done"

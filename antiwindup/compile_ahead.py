@@ -42,6 +42,12 @@ def steps(folder: Path) -> list[Step]:
         experiment("simulate", first, "--sample-time", "0.01", *run, after=()),
         experiment("campaign", folder / "campaign.parquet", "--plants", "1", "--seed", "1", "--periods", "1"),
         experiment("simulate", folder / "slewing.csv", *slewing),
+        Step(
+            "limits",
+            ("experiments", "limits", *given, "--output", str(folder), "--", str(design)),
+            (folder / "limits_extended.csv", folder / "limits_extended_summary.csv"),
+            (design, first),
+        ),
         experiment("sampled", folder / "sampled.csv", "--rate", "1000", *run),
     ]
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from identification.base.errors import InputError
 from identification.base.files import keep_journal
-from identification.base.process import begin, leave_signals_to_parent, undisturbed
+from identification.base.process import begin, import_own_code, leave_signals_to_parent, undisturbed
 
 _server = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else None
 _is_loading = False
@@ -29,7 +29,7 @@ def load_ahead() -> None:
     if _server is None or _is_loading:
         return
     _is_loading = True
-    _import_nothing_from_here()
+    import_own_code()
     multiprocessing.get_context("forkserver").set_forkserver_preload(["antiwindup.preloaded"])
     with undisturbed, suppress(OSError):
         ensure_running()
@@ -55,7 +55,7 @@ def start(command: Sequence[str], log: Path, journal: Path) -> BaseProcess:
     InputError
         No process can be started.
     """
-    _import_nothing_from_here()
+    import_own_code()
     context = multiprocessing.get_context(_server if _is_loading else "spawn")
     process: BaseProcess = context.Process(target=_run, args=(tuple(command), str(log), journal))  # type: ignore[attr-defined]
     try:
@@ -65,11 +65,6 @@ def start(command: Sequence[str], log: Path, journal: Path) -> BaseProcess:
         wanted = "packages that load in this folder, and the files and the memory that they need"
         raise InputError(f"no process can be started ({error}); expected {wanted}") from None
     return process
-
-
-def _import_nothing_from_here() -> None:
-    """Let the processes to come import nothing from the folder that they happen to run in."""
-    os.environ["PYTHONSAFEPATH"] = "1"
 
 
 def _run(command: Sequence[str], log: str, journal: Path) -> None:

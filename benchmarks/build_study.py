@@ -149,6 +149,8 @@ def main() -> None:
     parser.add_argument("--output", type=Path, help="existing folder for build.csv")
     asked = parser.parse_args()
     checkouts = {"this": ROOT, **({str(asked.against.name): asked.against} if asked.against else {})}
+    if asked.output is not None and not asked.output.is_dir():
+        parser.error(f"--output {asked.output}: is no folder; expected an existing one")
     selected = [wait for wait in waits() if asked.only in wait.name and (asked.only or wait.command[0] != "pytest")]
     rows = []
     with tempfile.TemporaryDirectory() as name:

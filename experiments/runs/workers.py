@@ -120,6 +120,7 @@ def _starting_with(work: Callable[..., Any]) -> BaseContext:
     while isinstance(work, partial):
         work = work.func
     context.set_forkserver_preload([work.__module__])
+    process.import_own_code()
     return context
 
 

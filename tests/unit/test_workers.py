@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import psutil
 import pytest
@@ -31,6 +32,18 @@ def test_what_the_work_refuses_is_said() -> None:
 def test_a_process_that_is_killed_is_said() -> None:
     with pytest.raises(WorkersLostError, match="a process that computed was killed"):
         gathered(os._exit, [1])
+
+
+def test_nothing_is_imported_from_the_folder_that_a_command_runs_in(tmp_path: Path) -> None:
+    """A folder named as a room of ours made the processes wait for ever; a file named as a package was run."""
+    (tmp_path / "experiments").mkdir()
+    (tmp_path / "numpy.py").write_text("raise SystemExit")
+    code = (
+        "from experiments.engine.simulate import limit_pair; from experiments.runs.workers import gathered;"
+        "print(gathered(limit_pair, [2.0]))"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (0, "[(-2.0, 2.0)]\n"), done.stderr
 
 
 def test_no_process_outlives_a_command_that_is_killed() -> None:

@@ -44,7 +44,7 @@ def usual_grid() -> Grid:
 
     Above that input the limits crowd towards it: the nearer, the later the loop leaves saturation.
     """
-    scan = np.concatenate([np.linspace(0.5, 0.995, 16), 1 + np.geomspace(1e-4, 0.3, 30), np.geomspace(1.35, 4.0, 20)])
+    scan = np.concatenate([np.linspace(0.5, 0.995, 16), 1 + np.geomspace(1e-4, 0.3, 30), np.linspace(1.35, 4.0, 46)])
     limits = np.concatenate([[0.95, 0.99], 1 + np.geomspace(1e-3, 3.0, 10)])
     return Grid(scan, limits, np.linspace(-1.0, 2.0, 13))
 
