@@ -4,7 +4,8 @@
 
 Each checkout is copied first, so that a module can be changed; with --against both are measured in turn. The commands
 are those of the Makefile, without the few milliseconds of make. CPU time is that of all processes, on Linux also of
-those that outlive the one that began them; the peak is that of the largest process.
+those that outlive the one that began them; the peak is that of the largest process. Both are nan where the command goes
+on after what is waited for.
 """
 
 from __future__ import annotations
@@ -135,7 +136,7 @@ def measured(wait: Wait, checkout: Path) -> tuple[float, ...]:
     status, *found = json.loads(run.stdout) if run.returncode == 0 else [run.returncode]
     if status != 0:
         sys.exit(f"{wait.name} ended with status {status} in {checkout}:\n{run.stderr}")
-    return tuple(found)
+    return (found[0], np.nan, np.nan) if wait.until else tuple(found)
 
 
 def main() -> None:
@@ -152,6 +153,10 @@ def main() -> None:
     if asked.output is not None and not asked.output.is_dir():
         parser.error(f"--output {asked.output}: is no folder; expected an existing one")
     selected = [wait for wait in waits() if asked.only in wait.name and (asked.only or wait.command[0] != "pytest")]
+    if not selected:
+        parser.error(
+            f"--only {asked.only}: is in no name; expected a part of one of {', '.join(w.name for w in waits())}"
+        )
     rows = []
     with tempfile.TemporaryDirectory() as name:
         copies = {label: copied(path, Path(name) / f"{k}") for k, (label, path) in enumerate(checkouts.items())}
