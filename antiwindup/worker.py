@@ -14,7 +14,7 @@ from pathlib import Path
 
 from identification.base.errors import InputError
 from identification.base.files import keep_journal
-from identification.base.process import begin, import_own_code, leave_signals_to_parent, undisturbed
+from identification.base.process import begin, leave_signals_to_parent, own_code_alone, undisturbed
 
 _server = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else None
 _is_loading = False
@@ -29,9 +29,8 @@ def load_ahead() -> None:
     if _server is None or _is_loading:
         return
     _is_loading = True
-    import_own_code()
     multiprocessing.get_context("forkserver").set_forkserver_preload(["antiwindup.preloaded"])
-    with undisturbed, suppress(OSError):
+    with undisturbed, own_code_alone(), suppress(OSError):
         ensure_running()
 
 
@@ -55,11 +54,10 @@ def start(command: Sequence[str], log: Path, journal: Path) -> BaseProcess:
     InputError
         No process can be started.
     """
-    import_own_code()
     context = multiprocessing.get_context(_server if _is_loading else "spawn")
     process: BaseProcess = context.Process(target=_run, args=(tuple(command), str(log), journal))  # type: ignore[attr-defined]
     try:
-        with undisturbed:
+        with undisturbed, own_code_alone():
             process.start()
     except (EOFError, OSError) as error:
         wanted = "packages that load in this folder, and the files and the memory that they need"

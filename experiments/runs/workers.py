@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from functools import partial
 from multiprocessing import get_all_start_methods, get_context, parent_process
 from multiprocessing.context import BaseContext
+from multiprocessing.forkserver import ensure_running
 from threading import Thread
 from typing import Any, TypeVar
 
@@ -120,7 +121,8 @@ def _starting_with(work: Callable[..., Any]) -> BaseContext:
     while isinstance(work, partial):
         work = work.func
     context.set_forkserver_preload([work.__module__])
-    process.import_own_code()
+    with process.undisturbed, process.own_code_alone():
+        ensure_running()
     return context
 
 

@@ -12,10 +12,11 @@ import sys
 import threading
 import time
 import warnings
+from contextlib import contextmanager
 
 TYPE_CHECKING = False  # of typing, which takes longer to import than all of this
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from typing import Any
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
@@ -47,15 +48,24 @@ def begin() -> None:
     _writable_homes()
 
 
-def import_own_code() -> None:
-    """Let processes to come import this package from where this one did, and nothing from the folder they run in.
+@contextmanager
+def own_code_alone() -> Iterator[None]:
+    """Processes that begin meanwhile import this package from where this one did, and nothing from their folder.
 
     A fork server is not told by Python 3.11 where this process imports from.
     """
-    os.environ["PYTHONSAFEPATH"] = "1"
-    root, there = __file__.rsplit(os.sep, 3)[0], os.environ.get("PYTHONPATH", "")
-    if root not in there.split(os.pathsep):
-        os.environ["PYTHONPATH"] = os.pathsep.join([root, there] if there else [root])
+    before = {name: os.environ.get(name) for name in ("PYTHONSAFEPATH", "PYTHONPATH")}
+    root = __file__.rsplit(os.sep, 3)[0]
+    others = (path for path in (before["PYTHONPATH"] or "").split(os.pathsep) if path not in ("", root))
+    os.environ.update(PYTHONSAFEPATH="1", PYTHONPATH=os.pathsep.join([root, *others]))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def leaves(sentence: str) -> None:
