@@ -14,7 +14,7 @@ from pathlib import Path
 
 from identification.base.errors import InputError
 from identification.base.files import keep_journal
-from identification.base.process import begin, leave_signals_to_parent, own_code_alone, undisturbed
+from identification.base.process import begin, leave_signals_to_parent, own_surroundings, undisturbed
 
 _server = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else None
 _is_loading = False
@@ -30,7 +30,7 @@ def load_ahead() -> None:
         return
     _is_loading = True
     multiprocessing.get_context("forkserver").set_forkserver_preload(["antiwindup.preloaded"])
-    with undisturbed, own_code_alone(), suppress(OSError):
+    with undisturbed, own_surroundings(), suppress(OSError):
         ensure_running()
 
 
@@ -57,7 +57,7 @@ def start(command: Sequence[str], log: Path, journal: Path) -> BaseProcess:
     context = multiprocessing.get_context(_server if _is_loading else "spawn")
     process: BaseProcess = context.Process(target=_run, args=(tuple(command), str(log), journal))  # type: ignore[attr-defined]
     try:
-        with undisturbed, own_code_alone():
+        with undisturbed, own_surroundings():
             process.start()
     except (EOFError, OSError) as error:
         wanted = "packages that load in this folder, and the files and the memory that they need"

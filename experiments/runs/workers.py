@@ -6,14 +6,12 @@ import logging
 import math
 import os
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from functools import partial
 from multiprocessing import get_all_start_methods, get_context, parent_process
 from multiprocessing.context import BaseContext
-from multiprocessing.forkserver import ensure_running
 from threading import Thread
 from typing import Any, TypeVar
 
@@ -90,11 +88,11 @@ def _here(work: Callable[[Item], Result], items: Sequence[Item]) -> Done[Result]
     cores = min(os.cpu_count() or 1, len(items))
     waiting = enumerate(items)
     running: dict[Future[Result], int] = {}
-    with _one_thread(), ProcessPoolExecutor(cores, _starting_with(work), _begin) as pool:
+    with ProcessPoolExecutor(cores, _starting_with(work), _begin) as pool:
         try:
             while True:
                 for number, item in waiting:
-                    with process.undisturbed:
+                    with process.undisturbed, process.own_surroundings():
                         future = pool.submit(work, item)
                     running[future] = number
                     if len(running) >= AHEAD * cores:
@@ -121,8 +119,6 @@ def _starting_with(work: Callable[..., Any]) -> BaseContext:
     while isinstance(work, partial):
         work = work.func
     context.set_forkserver_preload([work.__module__])
-    with process.undisturbed, process.own_code_alone():
-        ensure_running()
     return context
 
 
@@ -193,18 +189,3 @@ def _begin() -> None:
         os._exit(1)
 
     Thread(target=follow, daemon=True).start()
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Processes started now compute with one thread each: more would cost time, and change the last digits."""
-    before = {name: os.environ.get(name) for name in process.THREADS}
-    os.environ.update(dict.fromkeys(process.THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

@@ -49,15 +49,15 @@ def begin() -> None:
 
 
 @contextmanager
-def own_code_alone() -> Iterator[None]:
+def own_surroundings() -> Iterator[None]:
     """Processes that begin meanwhile import this package from where this one did, and nothing from their folder.
 
-    A fork server is not told by Python 3.11 where this process imports from.
+    A fork server is not told by Python 3.11 where this process imports from. Their matrix library has one thread.
     """
-    before = {name: os.environ.get(name) for name in ("PYTHONSAFEPATH", "PYTHONPATH")}
+    before = {name: os.environ.get(name) for name in (*THREADS, "PYTHONSAFEPATH", "PYTHONPATH")}
     root = __file__.rsplit(os.sep, 3)[0]
     others = (path for path in (before["PYTHONPATH"] or "").split(os.pathsep) if path not in ("", root))
-    os.environ.update(PYTHONSAFEPATH="1", PYTHONPATH=os.pathsep.join([root, *others]))
+    os.environ.update(dict.fromkeys(THREADS, "1"), PYTHONSAFEPATH="1", PYTHONPATH=os.pathsep.join([root, *others]))
     try:
         yield
     finally:
