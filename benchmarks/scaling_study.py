@@ -92,9 +92,11 @@ def cluster(workers: int) -> Iterator[Cluster]:
             closing.callback(process.kill)
             processes.append(psutil.Process(process.pid))
         deadline = time.monotonic() + PATIENCE_S
-        while not file.exists() and time.monotonic() < deadline:
+        said = ""
+        while not said.rstrip().endswith("}") and time.monotonic() < deadline:  # the file is there before it is whole
             time.sleep(0.05)
-        address = json.loads(file.read_text(encoding="utf-8"))["address"]
+            said = file.read_text(encoding="utf-8") if file.exists() else ""
+        address = json.loads(said)["address"]
         _wait_for(address, workers)
         yield Cluster(address, processes[0], processes[1:])
 

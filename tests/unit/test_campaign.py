@@ -297,9 +297,11 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
             started.append(stack.enter_context(process))
             stack.callback(started[-1].kill)
         deadline = time.monotonic() + 300
-        while not (folder / "address").exists() and time.monotonic() < deadline:
+        said = ""
+        while not said.rstrip().endswith("}") and time.monotonic() < deadline:  # the file is there before it is whole
             time.sleep(0.01)
-        address = json.loads((folder / "address").read_text(encoding="utf-8"))["address"]
+            said = (folder / "address").read_text(encoding="utf-8") if (folder / "address").exists() else ""
+        address = json.loads(said)["address"]
         with Client(address, set_as_default=False, timeout=300) as client:
             client.wait_for_workers(2, timeout=300)
         yield Cluster(address, started[0], started[1:])
