@@ -217,7 +217,7 @@ def simulate_watched(
 
 
 def _require_affordable(compiled: CompiledLoop, room: int, horizon: float) -> None:
-    step, shortest = compiled.step, float(compiled.delays[~compiled.brief].min(initial=math.inf))
+    step, shortest = compiled.step, min(map(float, compiled.delays[~compiled.brief]), default=math.inf)
     asked = (
         f"the shortest dead time, {shortest:.3g} s, asks for"
         if step > shortest / 2

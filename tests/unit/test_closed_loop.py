@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -104,6 +105,12 @@ def test_first_exit_finds_the_first_of_close_roots() -> None:
     g[:4] = np.array([0.3 * 0.3000001 * 2, 0.3 * 0.3000001 - 2 * 0.6000001, 2 - 0.6000001, 1.0])
     assert first_exit(g, 1.0) == pytest.approx(0.3, abs=1e-8)
     assert first_exit(g, 0.29) == -1.0
+
+
+def test_whole_numbers_are_dead_times_too(extended_design: Design) -> None:
+    loop = design_loop(extended_design, thesis_reference("extended", [1.5]), None)
+    runs = [simulate(replace(loop, delays=np.full(3, zero)), (-12.0, 12.0), np.array([0.0, 0.5])) for zero in (0, 0.0)]
+    assert np.array_equal(runs[0].control, runs[1].control)
 
 
 def test_extended_loop_agrees_with_the_independent_integrator(extended_design: Design) -> None:
