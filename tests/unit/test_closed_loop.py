@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -109,7 +108,10 @@ def test_first_exit_finds_the_first_of_close_roots() -> None:
 
 def test_whole_numbers_are_dead_times_too(extended_design: Design) -> None:
     loop = design_loop(extended_design, thesis_reference("extended", [1.5]), None)
-    runs = [simulate(replace(loop, delays=np.full(3, zero)), (-12.0, 12.0), np.array([0.0, 0.5])) for zero in (0, 0.0)]
+    runs = [
+        simulate(dataclasses.replace(loop, delays=np.full(3, zero)), (-12.0, 12.0), np.array([0.0, 0.5]))
+        for zero in (0, 0.0)
+    ]
     assert np.array_equal(runs[0].control, runs[1].control)
 
 
