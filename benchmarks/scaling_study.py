@@ -44,7 +44,7 @@ LIMIT, PERIODS = 12.0, 5
 PIECES, ROUNDS = 3, 3  # a worker, and how often
 POINTS = 64  # of a piece of the search
 EMPTY = 200  # pieces that do nothing
-PATIENCE_S = 120.0
+PATIENCE_S = 300.0
 MODELLED = (1, 10, 100, 1000)  # workers
 
 

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from threading import Thread
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from distributed import Client
 from pyarrow import parquet
 
+from benchmarks import scaling_study
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
 from design.stability.characteristic_roots import roots_right_of
@@ -274,41 +271,17 @@ def test_the_file(folder: Path, whole: bytes, extended_design: Design) -> None:
     assert not (folder / "whole.parquet.parts").exists()
 
 
-class Cluster(NamedTuple):
-    """Where its scheduler listens, and the processes."""
-
-    address: str
-    scheduler: subprocess.Popen[bytes]
-    workers: list[subprocess.Popen[bytes]]
-
-
 @pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+def cluster() -> Iterator[scaling_study.Cluster]:
     """A scheduler and two workers, of Dask's own commands; the tests below lose them one after the other."""
-    folder = tmp_path_factory.mktemp("cluster")
-    dask, at = [sys.executable, "-m", "dask"], ["--scheduler-file", str(folder / "address"), "--no-dashboard"]
-    worker = [*dask, "worker", "--nthreads", "1", "--no-nanny", "--local-directory", str(folder), *at]
-    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
-    with ExitStack() as stack:
-        started: list[subprocess.Popen[bytes]] = []
-        for command in ([*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", *at], worker, worker):
-            none = subprocess.DEVNULL
-            process = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=none, stderr=none)
-            started.append(stack.enter_context(process))
-            stack.callback(started[-1].kill)
-        deadline = time.monotonic() + 300
-        said = ""
-        while not said.rstrip().endswith("}") and time.monotonic() < deadline:  # the file is there before it is whole
-            time.sleep(0.01)
-            said = (folder / "address").read_text(encoding="utf-8") if (folder / "address").exists() else ""
-        address = json.loads(said)["address"]
-        with Client(address, set_as_default=False, timeout=300) as client:
-            client.wait_for_workers(2, timeout=300)
-        yield Cluster(address, started[0], started[1:])
+    with scaling_study.cluster(2) as started:
+        yield started
 
 
 @pytest.mark.usefixtures("small_chunks")
-def test_a_cluster_that_loses_a_worker_writes_the_same_file(folder: Path, whole: bytes, cluster: Cluster) -> None:
+def test_a_cluster_that_loses_a_worker_writes_the_same_file(
+    folder: Path, whole: bytes, cluster: scaling_study.Cluster
+) -> None:
     parts = folder / "cluster.parquet.parts"
 
     def lose_one() -> None:
@@ -327,7 +300,9 @@ def test_a_cluster_that_loses_a_worker_writes_the_same_file(folder: Path, whole:
 
 
 @pytest.mark.usefixtures("small_chunks")
-def test_what_a_scheduler_that_dies_leaves_goes_on_without_it(folder: Path, whole: bytes, cluster: Cluster) -> None:
+def test_what_a_scheduler_that_dies_leaves_goes_on_without_it(
+    folder: Path, whole: bytes, cluster: scaling_study.Cluster
+) -> None:
     parts = folder / "left.parquet.parts"
 
     def lose_it() -> None:

@@ -19,7 +19,6 @@ from design.blocks.block import Block
 from design.design_file import Design
 from design.hinf.mixed_sensitivity import synthesise
 from design.hinf.pick import Problem, SynthesisError
-from experiments.engine.ready_loop import ReadyLoop, ready_loop
 from experiments.engine.simulate import DivergenceError, simulate
 from experiments.physical_limits.integrator_bound import least_peak_error
 from experiments.runs.batch import Each, threaded
@@ -28,7 +27,7 @@ from experiments.runs.metrics import over_last
 from experiments.runs.references import Reference
 from experiments.thesis.printed_choices import chapter_2, thesis_reference
 from experiments.thesis.studies.chapter_2 import PERIODS
-from experiments.thesis.unprinted.chapter_4_conditions import starting_at
+from experiments.thesis.unprinted.chapter_4_conditions import Prepared, prepared
 from experiments.thesis.unprinted.where_met import Found, all_met, compared
 from identification.base.errors import InputError
 
@@ -110,16 +109,13 @@ class Loop:
     ----------
     design, reference
         What it is made of.
-    rest
-        The loop from y(0) = 0.
-    held
-        By how much its initial state moves with y(0).
+    prepared
+        The loop from y(0) = 0, ready to start from another.
     """
 
     design: Design
     reference: Reference
-    rest: ReadyLoop
-    held: np.ndarray
+    prepared: Prepared
 
     def errors(self, limit: float, output: float) -> dict[str, float]:
         """The error of the last of six periods under +-limit from y(0) = ``output``.
@@ -133,9 +129,8 @@ class Loop:
         """
         period, amplitude = self.reference.period_s, self.reference.amplitude
         time_s = np.linspace((PERIODS - 1) * period, PERIODS * period, SAMPLES_PER_PERIOD + 1)
-        loop = self.rest.starting_from(self.rest.loop.x0 + output * self.held)
         try:
-            error = simulate(loop, (-limit, limit), time_s).outputs["error"]
+            error = simulate(self.prepared.starting_at(output), (-limit, limit), time_s).outputs["error"]
         except DivergenceError:
             error = np.full(len(time_s), np.nan)
         offset, ripple = over_last(time_s, error, period)
@@ -148,8 +143,7 @@ def loop_of(design: Design) -> Loop:
     """The loop of a design."""
     reference = thesis_reference(design.kind, design.reference_omegas)
     loop = design_loop(design, reference, design.compensator("thesis"))
-    loop = replace(loop, outputs={"error": loop.outputs["error"]})
-    return Loop(design, reference, ready_loop(loop), starting_at(loop, design, 1.0).x0 - loop.x0)
+    return Loop(design, reference, prepared(loop, design, "exact"))
 
 
 def with_and_without_offset(of: Loop, limit: float) -> dict[float, dict[str, float]]:

@@ -41,6 +41,10 @@ class Prepared(NamedTuple):
     rest: ReadyLoop
     held: np.ndarray
 
+    def starting_at(self, output: float) -> ReadyLoop:
+        """The loop from y(0) = ``output``, see :func:`starting_at`."""
+        return self.rest.starting_from(self.rest.loop.x0 + output * self.held)
+
 
 @dataclass(frozen=True)
 class Conditions:
@@ -84,20 +88,15 @@ class Conditions:
     @cached_property
     def _prepared(self) -> dict[str, Prepared]:
         kinds = {"none": None, "thesis": self.design.compensator("thesis")}
-        return {name: self._prepare(design_loop(self.design, self.reference, kind)) for name, kind in kinds.items()}
-
-    def _prepare(self, loop: SaturatedLoop) -> Prepared:
-        watched = replace(loop, outputs={"error": loop.outputs["error"]})
-        rest, raised = (starting_at(watched, self.design, output) for output in (0.0, 1.0))
-        if self.delay == "pade":
-            rest, raised = (with_pade_at_rest(one, PADE_ORDER) for one in (rest, raised))
-        return Prepared(ready_loop(rest), raised.x0 - rest.x0)
+        return {
+            name: prepared(design_loop(self.design, self.reference, kind), self.design, self.delay)
+            for name, kind in kinds.items()
+        }
 
     def loop(self, kind: str, output: float) -> ReadyLoop:
         """The loop "none" (without anti-windup) or "thesis" (with the thesis's) from y(0) = ``output``, see
         :func:`starting_at`."""
-        rest, held = self._prepared[kind]
-        return rest.starting_from(rest.loop.x0 + output * held)
+        return self._prepared[kind].starting_at(output)
 
     def outcomes(self, kind: str, point: Point, samples: int = SAMPLES_PER_PERIOD) -> dict[str, float]:
         """What the loop of :meth:`loop` comes to in every reading, from so many samples of each of five periods.
@@ -122,6 +121,15 @@ class Conditions:
 @cache
 def _kept(set_name: str, delay: str) -> Conditions:
     return Conditions(set_name, delay)
+
+
+def prepared(loop: SaturatedLoop, design: Design, delay: str) -> Prepared:
+    """A loop of a design with the error as its only output, and the dead time of :attr:`Conditions.delay`."""
+    watched = replace(loop, outputs={"error": loop.outputs["error"]})
+    rest, raised = (starting_at(watched, design, output) for output in (0.0, 1.0))
+    if delay == "pade":
+        rest, raised = (with_pade_at_rest(one, PADE_ORDER) for one in (rest, raised))
+    return Prepared(ready_loop(rest), raised.x0 - rest.x0)
 
 
 def starting_at(loop: SaturatedLoop, design: Design, output: float) -> SaturatedLoop:
