@@ -34,7 +34,7 @@ $(foreach name,$(filter-out BUILD OUT,$(GIVEN)),$(eval $(call hand,$(name))))
 figures report: export ANTIWINDUP_OUTPUT := $(value BUILD)
 refit: export ANTIWINDUP_OUTPUT := $(value OUT)
 
-.PHONY: help figures report refit claims test suite bench bench-build study referee fuzz faults audit lint clean
+.PHONY: help figures report refit claims test suite bench bench-build docs study referee fuzz faults audit lint clean
 help: ## say what there is
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 	@echo
@@ -51,10 +51,12 @@ report: $(COMPILED) ## put verdicts, figures with data, ledger, fit, audits and 
 	@$(PY) -m antiwindup.from_make report
 refit: $(COMPILED) ## fit SWEEPS="a.csv b.csv", design, simulate, draw and sum up for that plant into OUT
 	@$(PY) -m antiwindup.from_make refit
-claims: $(READY) ## recompute what the thesis claims and say what agrees: build/claims/claims.csv, CLAIMS.md, docs/equations.md
+docs: $(READY) ## build the documentation site: build/docs/html/index.html
+	$(PY) -m sphinx --quiet --fail-on-warning --keep-going -d build/docs/doctrees docs build/docs/html
+claims: $(READY) ## recompute what the thesis claims and say what agrees: build/claims/claims.csv, docs/thesis/claims.md, docs/thesis/equations.md
 	@mkdir -p build/claims
-	@$(PY) -m experiments thesis claims --output build/claims --page CLAIMS.md
-	@$(PY) -m experiments thesis equations --page docs/equations.md
+	@$(PY) -m experiments thesis claims --output build/claims --page docs/thesis/claims.md
+	@$(PY) -m experiments thesis equations --page docs/thesis/equations.md
 test: $(READY) ## check style, types and everything else
 	@$(MAKE) --no-print-directory --jobs=2 lint suite
 suite: $(READY) ## run the tests alone

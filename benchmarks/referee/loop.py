@@ -26,7 +26,7 @@ from identification.model.plant import PlantModel
 
 MOST_STEPS = 25_000  # of the coarsest of the three runs
 FINENESS = 0.08  # of its step times the fastest eigenvalue
-CLAIMED = 1e-9  # of the largest value so far; docs/closed_loop.md claims better, and 1e-11 of a signal's largest value
+CLAIMED = 1e-9  # of the largest value so far; docs/explanation/closed_loop.md claims better
 SAFETY = 16.0  # times the finest run's error as the others show it at order 2: many kinks may cancel in them
 HOPELESS = 1e-3  # of the largest value: from where the steps differ by more on, nothing is compared
 

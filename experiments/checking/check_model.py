@@ -20,7 +20,7 @@ LEVEL = 0.01
 """Probability with which a check finds that something moved though nothing did: half for W_a, half for parameters.
 
 It holds where tests of the plant, old and new, differ by noise alone. Where they differ by more, a plant outside W_a
-need not have moved, and the rates are those that docs/check.md has measured.
+need not have moved, and the rates are those that docs/how_to/check.md has measured.
 """
 
 

@@ -114,7 +114,7 @@ def sector_with(design: Design, anti_windup: AntiWindup, true: PlantModel) -> fl
 
     Notes
     -----
-    By step 8 of docs/anti_windup.md the dead zone sees theta1~ - C S_Delta Delta (1 + theta1~) with
+    By step 8 of docs/explanation/anti_windup.md the dead zone sees theta1~ - C S_Delta Delta (1 + theta1~) with
     C S_Delta Delta = C S Delta/(1 + C S Delta), here of one known Delta and not of every one within W_a. With S and P
     of the model 1 + theta1~ becomes (1 + theta1~)/(1 + C S Delta), whose poles are those of theta1~ and the roots of
     the loop with P + Delta. Where that is stable a sector k < 1 bounds the norm of u - sat(u) as for the model, and one

@@ -27,7 +27,7 @@ MEMORY = (
 
 
 def files(controller: SampledController, run: CheckRun) -> dict[str, str]:
-    """The files by their names: NAME.json, whose keys docs/export.md explains, and NAME_test.csv."""
+    """The files by their names: NAME.json, whose keys docs/how_to/export.md explains, and NAME_test.csv."""
     standing = controller.standing
     low, high = (limit if math.isfinite(limit) else None for limit in controller.limits)
     content = {

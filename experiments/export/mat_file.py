@@ -19,7 +19,7 @@ DATED = 116  # bytes of text, in which scipy writes the time
 
 
 def mat_file(controller: SampledController, run: CheckRun, plant: PlantModel) -> bytes:
-    """The content of NAME.mat, whose variables docs/export.md explains; columns are column vectors."""
+    """The content of NAME.mat, whose variables docs/how_to/export.md explains; columns are column vectors."""
     from scipy.io import savemat
 
     P = plant_block(plant)

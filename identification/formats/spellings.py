@@ -74,7 +74,7 @@ class Spelling:
 
 
 def spelt(name: str) -> Spelling | None:
-    """What a column's name means, or None; the table of what is read, and from where, is in docs/files.md."""
+    """What a column's name means, or None; the table of what is read, and from where, is in docs/how_to/files.md."""
     if found := _PREFIXED.fullmatch(name):
         return Spelling(found[2], PREFIXES[found[1]])
     if (found := _PARAMETER.fullmatch(name)) and found[2].lower() in PARTS:

@@ -1,4 +1,4 @@
-"""CLAIMS.md is what the judged ledger says: counts, then what is unchecked, then what differs, then what agrees."""
+"""docs/thesis/claims.md: counts, then what is unchecked, then what differs, then what agrees."""
 
 import re
 from pathlib import Path
@@ -20,7 +20,7 @@ def page(judged: pd.DataFrame) -> str:
 
 def test_the_page_in_the_repository_is_current(page: str):
     """After a change of the ledger: `make claims`."""
-    assert (ROOT / "CLAIMS.md").read_text(encoding="utf-8") == page
+    assert (ROOT / "docs/thesis/claims.md").read_text(encoding="utf-8") == page
 
 
 def test_the_sections_stand_in_their_order_with_their_counts(page: str, judged: pd.DataFrame):

@@ -19,14 +19,14 @@ ROOMS = ("identification", "design", "experiments", "paper_figures")
 @pytest.mark.parametrize(
     ("page", "least"),
     [
-        ("anti_windup.md", 8),
-        ("outside_the_class.md", 7),
-        ("campaigns.md", 4),
-        ("designs.md", 12),
-        ("closed_loop.md", 8),
-        ("explore.md", 7),
-        ("errata.md", 30),
-        ("unprinted_conditions.md", 3),
+        ("explanation/anti_windup.md", 8),
+        ("explanation/outside_the_class.md", 7),
+        ("how_to/campaigns.md", 4),
+        ("explanation/designs.md", 12),
+        ("explanation/closed_loop.md", 8),
+        ("how_to/explore.md", 7),
+        ("thesis/errata.md", 30),
+        ("thesis/unprinted_conditions.md", 3),
     ],
 )
 def test_every_test_that_the_page_names_exists(page: str, least: int) -> None:
@@ -40,7 +40,7 @@ def test_every_test_that_the_page_names_exists(page: str, least: int) -> None:
 def test_the_errata_explain_every_claim_that_does_not_agree() -> None:
     """Each in one entry, with a test that the ledger names too."""
     ledger = read_ledger().set_index("id")
-    entries = (ROOT / "docs" / "errata.md").read_text(encoding="utf-8").split("\n### ")[1:]
+    entries = (ROOT / "docs" / "thesis" / "errata.md").read_text(encoding="utf-8").split("\n### ")[1:]
     explained: list[str] = []
     for entry in entries:
         text, _, rows = entry.partition("- *Rows:*")
@@ -100,7 +100,7 @@ def test_so_does_one_of_the_tests(folder: str) -> None:
         assert [name for name in found if name not in own and not resolves(name, "builtins")] == [], path
 
 
-PAGES = [ROOT / "README.md", ROOT / "data" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "data" / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())

@@ -1,4 +1,4 @@
-"""docs/anti_windup.md: each of its steps as a test."""
+"""docs/explanation/anti_windup.md: each of its steps as a test."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exported JSON: the equations as the file and docs/export.md state them, run by what reads nothing else."""
+"""Exported JSON: the equations as the file and docs/how_to/export.md state them, run by what reads nothing else."""
 
 from __future__ import annotations
 

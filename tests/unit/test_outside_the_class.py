@@ -1,4 +1,4 @@
-"""docs/outside_the_class.md: each of its statements as a test."""
+"""docs/explanation/outside_the_class.md: each of its statements as a test."""
 
 from __future__ import annotations
 

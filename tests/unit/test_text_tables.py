@@ -37,7 +37,7 @@ BODE_100 = (
     '"Trace 2: Gain: Real ";"Trace 2: Gain: Imaginary ";Trace 2: Gain: Phase (°)\n'
 )
 TEXTS: dict[str, tuple[str, str]] = {
-    # instruments; docs/files.md says where the headers were seen
+    # instruments; docs/how_to/files.md says where the headers were seen
     "Bode 100": (BODE_100 + _rows(F, H.real, H.imag, DB, H.real, H.imag, DEG, by=";"), "utf-8-sig"),
     "Bode 100, traces of one part each": (
         "Frequency (Hz),Trace 1: Gain: Magnitude (dB),Trace 2: Gain: Phase (°)\n" + POLAR,

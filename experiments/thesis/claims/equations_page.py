@@ -1,4 +1,4 @@
-"""data/thesis/equations.csv, the thesis's labels with their functions and tests -> docs/equations.md."""
+"""data/thesis/equations.csv, the thesis's labels with their functions and tests -> docs/thesis/equations.md."""
 
 from __future__ import annotations
 
@@ -40,11 +40,12 @@ HEAD = """# The thesis's equations, each with its function and its test
 Every numbered equation, definition, lemma, theorem, remark, table and figure of the thesis, in its order, with the one
 function, method or class that is it here and the test that checks it. The functions' docstrings name the labels too.
 
-The page is made from `data/thesis/equations.csv` by `python -m experiments thesis equations --page docs/equations.md`.
+The page is made from `data/thesis/equations.csv` by
+`python -m experiments thesis equations --page docs/thesis/equations.md`.
 A test fails when a label is missing, has no function that names it or no test; `benchmarks/equations_study.py` runs
 each test by itself and says whether it executed the function. Links are to files: search for the name there. What the
 thesis
-claims beyond its equations is judged in [CLAIMS.md](../CLAIMS.md)."""
+claims beyond its equations is judged in [claims.md](claims.md)."""
 
 
 def read_equations(path: Path = EQUATIONS) -> pd.DataFrame:
@@ -99,7 +100,7 @@ def equations_page(table: pd.DataFrame) -> str:
 
     Notes
     -----
-    Links lead from docs/ to the file of a function or test, without line numbers, which would go stale with every edit.
+    Links lead from docs/thesis to the file of a function or test, without line numbers: every edit would move them.
     """
     chapter = table["label"].str.extract(r"(\d)\.", expand=False).ffill()
     parts = [HEAD]
@@ -126,9 +127,9 @@ def _function_link(name: str) -> str:
     file = Path(*module.split("."))
     if (REPOSITORY / file).is_dir():
         file /= "__init__"
-    return f"[{module.rpartition('.')[2]}.{path}](../{file.as_posix()}.py)"
+    return f"[{module.rpartition('.')[2]}.{path}](../../{file.as_posix()}.py)"
 
 
 def _test_link(test: str) -> str:
     file, _, name = test.partition("::")
-    return f"[{name}](../{file})"
+    return f"[{name}](../../{file})"

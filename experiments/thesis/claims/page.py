@@ -1,4 +1,4 @@
-"""The judged ledger -> CLAIMS.md: counts, what is unchecked, what differs and why, what agrees."""
+"""The judged ledger -> docs/thesis/claims.md: counts, what is unchecked, what differs and why, what agrees."""
 
 from __future__ import annotations
 

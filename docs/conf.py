@@ -1,0 +1,131 @@
+"""The documentation site: `make docs`."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import warnings
+from importlib.metadata import metadata
+from pathlib import Path
+from types import GenericAlias
+from typing import TYPE_CHECKING, Any
+
+from jinja2 import FileSystemLoader
+from jinja2.sandbox import SandboxedEnvironment
+from latex2mathml.converter import convert
+from numpydoc import docscrape_sphinx
+
+if TYPE_CHECKING:
+    from docutils import nodes
+    from sphinx.application import Sphinx
+    from sphinx.writers.html5 import HTML5Translator
+
+warnings.filterwarnings("ignore", "Unknown section", module="numpydoc")  # in docstrings of others
+os.environ["NUMBA_DISABLE_JIT"] = "1"  # a compiled function would hide its docstring and its arguments
+ROOT = Path(__file__).resolve().parents[1]
+API = ROOT / "docs" / "reference" / "api"
+ROOMS = ("identification", "design", "experiments", "paper_figures", "antiwindup")
+LITERAL = re.compile(r"(``.+?``)")
+sys.path.insert(0, str(ROOT))  # data.thesis
+
+project = "Anti-windup for plants with dead time and integral action"
+author = "The maintainers"
+project_copyright = "the maintainers; code BSD 3-Clause"
+release = metadata("antiwindup-thesis")["Version"]
+extensions = [
+    "myst_nb",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.viewcode",
+    "sphinx_click",
+    "sphinx_copybutton",
+]
+exclude_patterns = ["images"]
+
+nitpicky = False
+root_doc = "index"
+
+# pages
+myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "attrs_inline", "colon_fence"]
+myst_heading_anchors = 4
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(ROOT / "build" / "docs" / "notebooks")
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
+nb_merge_streams = True
+
+# docstrings
+add_module_names = False
+autodoc_typehints = "none"
+autodoc_default_options = {"members": True, "show-inheritance": False}
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+
+# numpydoc would compile its template anew for each docstring, a third of the site's time
+TEMPLATES = SandboxedEnvironment(loader=FileSystemLoader(Path(docscrape_sphinx.__file__).with_name("templates")))
+docscrape_sphinx.SandboxedEnvironment = lambda loader: TEMPLATES
+
+# the site
+html_theme = "pydata_sphinx_theme"
+html_title = "Anti-windup"
+html_static_path = ["_static"]
+html_show_sourcelink = False
+html_theme_options = {
+    "show_toc_level": 2,
+    "navigation_with_keys": False,
+    "footer_start": ["copyright"],
+    "footer_end": [],
+}
+linkcheck_timeout = 20
+
+
+def mathml(translator: HTML5Translator, node: nodes.Element) -> None:
+    """A formula as MathML, which browsers typeset by themselves: no script, no network."""
+    from docutils.nodes import SkipNode
+
+    display = "inline" if node.tagname == "math" else "block"
+    translator.body.append(convert(node.astext(), display=display))
+    raise SkipNode
+
+
+def without_substitutions(*arguments: Any) -> None:
+    """Take bars in docstrings and help texts for absolute values, and not for substitutions."""
+    lines: list[str] = arguments[-1]
+    for row, line in enumerate(lines):
+        parts = LITERAL.split(line)
+        lines[row] = "".join(part if k % 2 else part.replace("|", r"\|") for k, part in enumerate(parts))
+
+
+def of_others(app: Sphinx, what: str, name: str, thing: object, skip: bool, options: object) -> bool | None:
+    """Leave out names for types of others: numpydoc cannot write their signatures."""
+    return True if isinstance(thing, GenericAlias) else None
+
+
+def write_api_pages(app: Sphinx) -> None:
+    """Write a page for each package of the rooms: what its modules hold, and the packages in it."""
+    for room in ROOMS:
+        for init in sorted((ROOT / room).rglob("__init__.py")):
+            package, folder = ".".join(init.parent.relative_to(ROOT).parts), init.parent
+            inner = [f"   {package}.{each.parent.name}" for each in sorted(folder.glob("*/__init__.py"))]
+            modules = [package, *(f"{package}.{each.stem}" for each in sorted(folder.glob("[!_]*.py")))]
+            lines = [package, "=" * len(package), ""]
+            lines += [".. toctree::", "", *inner, ""] if inner else []
+            for module in modules:
+                if module != package:
+                    lines += [module.rpartition(".")[2], "-" * len(module), ""]
+                lines += [f".. automodule:: {module}", ""]
+            (API / f"{package}.rst").write_text("\n".join(lines), encoding="utf-8")
+
+
+def setup(app: Sphinx) -> None:
+    """Register what this file adds to Sphinx."""
+    app.connect("builder-inited", write_api_pages)
+    app.connect("autodoc-process-docstring", without_substitutions)
+    for part in ("description", "usage", "options", "arguments", "epilog"):
+        app.connect(f"sphinx-click-process-{part}", without_substitutions)
+    app.connect("autodoc-skip-member", of_others)
+    app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
+
+
+html_math_renderer = "mathml"
