@@ -126,7 +126,7 @@ def _room(row: Any) -> str:
 
 def _link(test: str) -> str:
     file, _, name = test.partition("::")
-    return f"[{name}]({file})"
+    return f"[{name}](../../{file})"
 
 
 def _code(text: str) -> str:
