@@ -58,7 +58,7 @@ def test_what_differs_stands_with_reason_and_links_to_its_evidence(page: str, ju
         assert str(row.reason).replace("|", r"\|") in line
         for test in str(row.evidence).split():
             file, name = test.split("::")
-            assert f"[{name}]({file})" in line
+            assert f"[{name}](../../{file})" in line
             assert (ROOT / file).is_file()
 
 
