@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.engine.kinks import shift
+from experiments.engine.kinks import FACTORIAL, INVERSE
 from experiments.engine.step_table import NEGLIGIBLE, NOTHING, ROUNDING, Tables, dot, whole_lanes
 from identification.base.arrays import Array
 from identification.base.compiled import njit
@@ -53,31 +53,22 @@ def driven(z: Array, n: int, filled: Array, size: Array, reach: float) -> int:
 
 
 @njit(nogil=True)
-def change(
-    z: Array, n: int, k: int, j: int, past: Array, ago: float, now: Array, degree: int, radius: float, size: float,
-    filled: Array, W: Array, work: Array,
-) -> float:  # fmt: skip
-    """Put into z what a brief dead time changes of a signal; how much that differs from what z held before.
+def derive(z: Array, n: int, k: int, derived: Array, filled: Array) -> int:
+    """Add what the brief delayed signals have of the others, to which degrees z is ``filled`` (k,); the highest degree.
 
-    ``now`` (most + 1,) holds the signal's coefficients up to ``degree``. Before the dead time it was the same
-    polynomial ``ago`` steps earlier or, where that is 0, ``past`` (most + 1,). ``W`` (most + 1,) and ``work``
-    (2, most + 1) are room.
+    ``derived`` is (k, k, derivatives), see :func:`experiments.engine.brief_dead_times.derived`.
     """
-    most = len(now) - 1
-    for i in range(most + 1):
-        W[i] = past[i] if ago == 0 else (now[i] if i <= degree else 0.0)
-    if ago > 0:
-        shift(W, degree, -ago, work)
-    for i in range(degree + 1):
-        W[i] -= now[i]
-    for i in range(most + 1):
-        work[0, i], z[n + 1 + k * i + j] = z[n + 1 + k * i + j], 0.0
-    filled[j] = fill(z, n, k, j, W, most, radius, NEGLIGIBLE * size)
-    difference, power = 0.0, 1.0
-    for i in range(most + 1):
-        difference += abs(z[n + 1 + k * i + j] - work[0, i]) * power
-        power *= radius
-    return difference
+    known = 0
+    for q in range(k):
+        known = max(known, filled[q])
+    for j in range(k):
+        for q in range(k):
+            for i in range(filled[q] + 1 if derived[j, q, 0] != 0 else 0):
+                for order in range(min(derived.shape[2] - 1, filled[q] - i) + 1):
+                    higher = FACTORIAL[i + order] * INVERSE[i] * z[n + 1 + k * (i + order) + q]
+                    z[n + 1 + k * i + j] += derived[j, q, order] * higher
+                filled[j] = known
+    return known
 
 
 @njit(nogil=True)
