@@ -121,7 +121,7 @@ def cost(loop: SaturatedLoop, limit: float, horizon_s: float) -> Cost:
 
 
 def print_shares(loop: SaturatedLoop, limit: float) -> None:
-    """Print where the processor time of a run goes that is sampled every millisecond: what it costs with parts left out."""
+    """Print where the processor time of a run goes that is sampled every millisecond, by leaving parts out."""
     every, ends = np.linspace(0.0, HORIZON_S, round(1000 * HORIZON_S) + 1), np.array([0.0, HORIZON_S])
     parts = [partial(simulate, loop, (-limit, limit), every), partial(simulate, loop, (-limit, limit), ends)]
     whole, unsampled, prepared = (median_of(part) for part in (*parts, partial(compile_loop, loop)))

@@ -76,12 +76,14 @@ def unfold(
     tables: Tables, which: int, k: int, z: Array, sizes: Array, known: int, radius: float, usual: int, size: Array,
     negligible: Array, P: Array, terms: Array,
 ) -> tuple[int, float]:  # fmt: skip
-    """Fill P[: 1 + k], P (signals, most + 1), with the coefficients of u and Z x until all that follow are negligible up to a radius.
+    """Fill P[: 1 + k] with the coefficients of u and Z x until all that follow are negligible up to a radius.
 
     Parameters
     ----------
     tables, which
         Of both modes, and the mode's.
+    P
+        Shape (signals, most + 1).
     z, known, radius
         What the step begins with, the highest degree of a delayed signal in it, and how many steps far the polynomials
         are read.
