@@ -80,13 +80,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def searched_once() -> Iterator[None]:
-    """What is searched for a W_a alone, whatever the design, is searched once a session for each."""
+    """What is searched for a W_a alone, and the margins of a loop, are searched once a session for each."""
     from design.anti_windup import judge
     from design.auditing import audit_design
+    from design.stability.margins import margins_of
+    from experiments.runs import guarantee
+    from experiments.thesis.studies import robustness
+    from paper_figures.look import loop_curves
 
+    margins = cache(margins_of)
     with pytest.MonkeyPatch.context() as patch:
         for module, name in ((judge, "corrected"), (judge, "thesis_choice"), (audit_design, "least_f")):
             patch.setattr(module, name, cache(getattr(module, name)))
+        for module in (audit_design, guarantee, robustness, loop_curves):
+            patch.setattr(module, "margins_of", margins)
         yield
 
 

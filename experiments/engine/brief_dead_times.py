@@ -67,6 +67,7 @@ def _fastest(modes: Sequence[np.ndarray], n: int) -> float:
     return max(float(np.abs(np.linalg.eigvals(rows[:n, :n])).max()) for rows in modes[:2])  # slewing adds zeros
 
 
+@np.errstate(over="ignore", invalid="ignore")  # where it does not settle, it may leave all bounds
 def present_of(rows: np.ndarray, n: int, delays: np.ndarray, brief: np.ndarray) -> np.ndarray | None:
     """S, what comes out of the brief dead times as a function of (x, m, v, T v', T^2 v'', ...); T is the longest.
 
@@ -103,6 +104,8 @@ def present_of(rows: np.ndarray, n: int, delays: np.ndarray, brief: np.ndarray) 
             if np.all(parts <= 0.1 * ROUNDING * made):
                 break
         else:
+            return None
+        if not np.isfinite(made).all():
             return None
         if np.all(np.abs(found - S) <= ROUNDING * made):
             return np.asarray(found)

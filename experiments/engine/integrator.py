@@ -77,7 +77,7 @@ def integrate(
     cursor, filled = np.zeros(k, np.int64), np.zeros(k, np.int64)
     queue, queued = np.empty(room), 0  # mesh points to come: the images of kinks
 
-    z, P, W = np.zeros(increments.shape[2]), np.zeros((1 + k, most + 1)), np.zeros(most + 1)
+    z, P, W = np.zeros(increments.shape[2]), np.zeros((signals, most + 1)), np.zeros(most + 1)
     sizes, terms, later, negligible = np.zeros(len(z)), np.zeros(n), np.zeros(n), np.zeros(1 + k)
     work = np.zeros((2, most + 1))
     U, V = P[0], np.zeros((most + 1, n + 1 + k))
@@ -85,11 +85,10 @@ def integrate(
     rest = np.array([times(indptr, indices, data, saturated + n + 1 + j, V, 0) for j in range(k)])
     remembered = Past(starts, lates, degrees, history, rest, queue)
     V[0, n + 1 :] = rest
-    x, scale, size = x0.copy(), np.abs(x0), np.zeros(1 + k)
-    size[1:] = np.abs(rest)
+    x, scale, size = x0.copy(), np.abs(x0), np.zeros(signals)
+    size[1 : 1 + k] = np.abs(rest)
     last = np.zeros(1 + k)
-    seen = np.zeros(signals - 1 - k)  # of what is watched
-    shown, tops = np.zeros((len(values), most + 1)), np.zeros(len(values), np.int64)
+    tops, unfolded = np.zeros(signals, np.int64), np.zeros(signals, np.int64)  # degrees, and in which step
     taus, found = np.zeros(AT_ONCE), np.zeros(AT_ONCE)
     u = times(indptr, indices, data, saturated + n, V, 0)
     mode = 0 if slews else (1 if u > high else (-1 if u < low else 0))
@@ -206,23 +205,21 @@ def integrate(
                 continue
             sample[g] = until
             for o in range(-1 if g == 0 else groups[g], groups[g + 1]):
-                tops[1 + o], signal = degree, 0 if o < 0 else reads[o]
+                signal = 0 if o < 0 else reads[o]
                 if signal <= k:
-                    for i in range(degree + 1):
-                        shown[1 + o, i] = P[signal, i]
-                else:
-                    tops[1 + o] = expand(
-                        tables, which, signal, signals, z, sizes, columns, degree, most, terms, later, seen,
-                        signal - 1 - k, shown, 1 + o,
-                    )  # fmt: skip
+                    tops[signal] = degree
+                elif unfolded[signal] < steps:
+                    unfolded[signal] = steps
+                    tops[signal] = expand(tables, which, signal, k, z, sizes, known, degree, terms, later, size, P)
             for at in range(begin, until, AT_ONCE):
                 several = min(AT_ONCE, until - at)
                 for q in range(several):
                     taus[q] = (samples[g, at + q] - t - late) / step
-                for o in range(0 if g == 0 else 1 + groups[g], 1 + groups[g + 1]):
-                    evaluate(shown, o, tops[o], taus, found)
+                for o in range(-1 if g == 0 else groups[g], groups[g + 1]):
+                    signal = 0 if o < 0 else reads[o]
+                    evaluate(P, signal, tops[signal], taus, found)
                     for q in range(several):
-                        values[o, at + q] = found[q]
+                        values[1 + o, at + q] = found[q]
 
         m = place(U, degree, mode, low, high, x[n - 1], slope, reach) if slews and reach > 0 else x[n - 1]
         if reach == 1.0:

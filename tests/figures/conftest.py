@@ -49,6 +49,8 @@ def as_pdf() -> AsPdf:
     def as_pdf(figure: Figure) -> bytes:
         written = BytesIO()
         figure.set_layout_engine("none")
+        for axis in figure.findobj(Axis):
+            axis.get_ticklabels(which="both")  # that they are found and named, whatever the view
         for artist in figure.findobj(lambda artist: isinstance(artist, Axis | Legend | Text)):
             artist.set_visible(False)
         with style.styled():

@@ -18,6 +18,7 @@ from design.blocks.block import Block
 from design.chapter_2.design_delay_free import design_delay_free
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
+from experiments.engine.brief_dead_times import present_of
 from experiments.engine.compiled_loop import compile_loop
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import simulate
@@ -198,3 +199,9 @@ def test_brief_dead_times_beside_others(delays: tuple[float, float]) -> None:
     np.testing.assert_allclose(run.events_s, events_s, rtol=0, atol=1e-13)
     for found, wanted in [(run.control, control), (run.outputs["output"], outputs["output"])]:
         np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+
+
+def test_a_brief_dead_time_whose_iteration_leaves_all_bounds_sets_the_step() -> None:
+    """x' = w, u = 0, w(t) = 1e12 x(t - h): the growth in h has no slow mode that the iteration finds."""
+    rows, delays = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [1e12, 0.0, 0.0]]), np.array([1e-3])
+    assert present_of(rows, 1, delays, delays > 0) is None
