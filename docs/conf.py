@@ -25,6 +25,7 @@ warnings.filterwarnings("ignore", "Unknown section", module="numpydoc")  # in do
 os.environ["NUMBA_DISABLE_JIT"] = "1"  # a compiled function would hide its docstring and its arguments
 ROOT = Path(__file__).resolve().parents[1]
 API = ROOT / "docs" / "reference" / "api"
+COMMANDS = ROOT / "docs" / "reference" / "commands"
 ROOMS = ("identification", "design", "experiments", "paper_figures", "antiwindup")
 LITERAL = re.compile(r"(``.+?``)")
 sys.path.insert(0, str(ROOT))  # data.thesis
@@ -104,6 +105,7 @@ def of_others(app: Sphinx, what: str, name: str, thing: object, skip: bool, opti
 
 def write_api_pages(app: Sphinx) -> None:
     """Write a page for each package of the rooms: what its modules hold, and the packages in it."""
+    API.mkdir(exist_ok=True)
     for room in ROOMS:
         for init in sorted((ROOT / room).rglob("__init__.py")):
             package, folder = ".".join(init.parent.relative_to(ROOT).parts), init.parent
@@ -118,9 +120,36 @@ def write_api_pages(app: Sphinx) -> None:
             (API / f"{package}.rst").write_text("\n".join(lines), encoding="utf-8")
 
 
+def write_command_pages(app: Sphinx) -> None:
+    """Write a page for each command, and one for each group with the commands in it."""
+    from click import Context, Group
+
+    from antiwindup.__main__ import main
+
+    def write(name: str, group: Group) -> None:
+        context = Context(group, info_name=name)
+        found = {each: group.get_command(context, each) for each in group.list_commands(context)}
+        for each, command in found.items():
+            if command is None or not (group is main or isinstance(command, Group)):
+                continue
+            inner = ""
+            if isinstance(command, Group):
+                write(f"{name} {each}", command)
+                leaves = [leaf for leaf, what in command.commands.items() if not isinstance(what, Group)]
+                inner = f"   :nested: full\n   :commands: {', '.join(leaves)}\n"
+            place = f"{command.callback.__module__}:{command.callback.__name__}"
+            text = f".. click:: {place}\n   :prog: {name} {each}\n{inner}"
+            file = COMMANDS / f"{name} {each}.rst".removeprefix("antiwindup ").replace(" ", "_")
+            file.write_text(text, encoding="utf-8")
+
+    COMMANDS.mkdir(exist_ok=True)
+    write("antiwindup", main)
+
+
 def setup(app: Sphinx) -> None:
     """Register what this file adds to Sphinx."""
     app.connect("builder-inited", write_api_pages)
+    app.connect("builder-inited", write_command_pages)
     app.connect("autodoc-process-docstring", without_substitutions)
     for part in ("description", "usage", "options", "arguments", "epilog"):
         app.connect(f"sphinx-click-process-{part}", without_substitutions)

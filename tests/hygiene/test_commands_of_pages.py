@@ -47,7 +47,9 @@ def test_click_takes_the_command(words: list[str], tmp_path: Path, monkeypatch: 
     for word in words:
         if FILE.fullmatch(word):
             (tmp_path / word).parent.mkdir(parents=True, exist_ok=True)
-            (tmp_path / word).write_text("rate = 2000\nlimit = 12\n" if word.endswith(".toml") else "", encoding="utf-8")
+            (tmp_path / word).write_text(
+                "rate = 2000\nlimit = 12\n" if word.endswith(".toml") else "", encoding="utf-8"
+            )
     for folder in ("drive", "figures", "mine", "results", "tables"):
         (tmp_path / folder).mkdir(exist_ok=True)
     command: click.Command = main
