@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from experiments.options import DESIGN, LIMIT_PAIR, asked_limits
+from experiments.options import ANTI_WINDUP, DESIGN, LIMIT_PAIR, asked_limits
 from experiments.pair_options import PairCommand
 from identification.base.axis_option import AXIS
 from identification.base.errors import InputError
@@ -22,14 +22,10 @@ TARGETS = ("c", "matlab", "python", "json", "simulink", "fmu")
 @click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
 @click.option("--to", type=click.Choice(TARGETS), required=True, help="What is written.")
 @LIMIT_PAIR
-@click.option(
-    "--anti-windup",
-    default="corrected",
-    help="none, thesis, corrected, another of DESIGN, or one of others: see the README.",
-)
+@ANTI_WINDUP
 @click.option(
     "--method",
-    help="How it is discretised, matched, tustin or exact: see the README; unless given, that of `sampled`.",
+    help="How the controller is discretised: matched, tustin or exact; unless given, as `sampled` chooses.",
 )
 @click.option(
     "--precision",

@@ -17,6 +17,7 @@ from latex2mathml.converter import convert
 from numpydoc import docscrape_sphinx
 
 if TYPE_CHECKING:
+    from click import Context
     from docutils import nodes
     from sphinx.application import Sphinx
     from sphinx.writers.html5 import HTML5Translator
@@ -45,6 +46,8 @@ extensions = [
 exclude_patterns = ["images"]
 
 nitpicky = False
+smartquotes_action = "qe"  # and no dashes, of which options are full
+default_role = "literal"
 root_doc = "index"
 
 # pages
@@ -96,6 +99,14 @@ def without_substitutions(*arguments: Any) -> None:
     for row, line in enumerate(lines):
         parts = LITERAL.split(line)
         lines[row] = "".join(part if k % 2 else part.replace("|", r"\|") for k, part in enumerate(parts))
+
+
+def whole_metavars(app: Sphinx, context: Context, lines: list[str]) -> None:
+    """Give an option's value its brackets back, of which sphinx-click takes the outer ones away."""
+    for parameter in context.command.params:
+        if parameter.metavar and "[" in parameter.metavar:
+            cut = f"<{parameter.metavar.strip('[]')}>"
+            lines[:] = [line.replace(cut, f"<{parameter.metavar}>") for line in lines]
 
 
 def of_others(app: Sphinx, what: str, name: str, thing: object, skip: bool, options: object) -> bool | None:
@@ -153,6 +164,7 @@ def setup(app: Sphinx) -> None:
     app.connect("autodoc-process-docstring", without_substitutions)
     for part in ("description", "usage", "options", "arguments", "epilog"):
         app.connect(f"sphinx-click-process-{part}", without_substitutions)
+    app.connect("sphinx-click-process-options", whole_metavars)
     app.connect("autodoc-skip-member", of_others)
     app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from experiments.options import DESIGN, LIMIT_PAIR, asked_limits, disturbance_options, reference_options
+from experiments.options import ANTI_WINDUP, DESIGN, LIMIT_PAIR, asked_limits, disturbance_options, reference_options
 from experiments.pair_options import PairCommand
 from experiments.tables import csv_writer
 from identification.base.axis_option import AXIS
@@ -26,11 +26,7 @@ _run_options = together(
     DESIGN,
     AXIS,
     LIMIT_PAIR,
-    click.option(
-        "--anti-windup",
-        default="corrected",
-        help="none, thesis, corrected, another of DESIGN, or one of others: see the README.",
-    ),
+    ANTI_WINDUP,
     click.option("--until", type=float, required=True, help="Length of the run in seconds."),
     reference_options,
     disturbance_options,
@@ -157,7 +153,7 @@ def simulate_command(
 @click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
 @click.option(
     "--method",
-    help="How it is discretised, matched, tustin or exact: see the README; unless given, that of least steady error "
+    help="How the controller is discretised: matched, tustin or exact; unless given, the one of least steady error "
     "among those with a stable linear loop.",
 )
 @click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels in its unit; 0, no levels.")
