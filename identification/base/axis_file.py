@@ -141,16 +141,18 @@ KEYS = {
     "robust-level": Key(
         "positive",
         "0.5",
-        "|W_a C S| stays at most this, below 1, where it is no longer proved that the loop is stable with every plant "
-        "within the bound W_a.",
+        "The most that |W_a C S| may be, below 1. From 1 on it is no longer proved that the loop is stable with every "
+        "plant within the bound W_a.",
     ),
     "guarantee": Key(
         "global|robust|sector",
         '"robust"',
-        "What the anti-windup guarantees: global, whatever the control; robust, so for every plant within W_a; sector, "
-        "up to a control.",
+        "What the anti-windup guarantees: global, whatever the control; robust, the same for every plant within W_a; "
+        "sector, as long as the control stays below a bound.",
     ),
-    "recovery": Key("positive", "0.5", "Most time in seconds for the anti-windup's slowest mode to fall to 1 %."),
+    "recovery": Key(
+        "positive", "0.5", "The most time in seconds in which the anti-windup's slowest mode falls to 1 %."
+    ),
 }
 """Every key, in the order of the file."""
 
