@@ -132,8 +132,8 @@ def delay_free(
     "--robust-level",
     type=float,
     metavar="LEVEL",
-    help=f"T_so rolls off as late as |W_a C S| <= LEVEL < 1 allows; {ROBUST_LEVEL:g} where --a is not given, or the "
-    "plant is outside the thesis's class.",
+    help="Let T_so roll off, as late as |W_a C S| <= LEVEL < 1 allows. "
+    f"Default: {ROBUST_LEVEL:g} if --a is not given or the plant is outside the thesis's class; else no roll-off.",
 )
 @corrected_options
 @OUTPUT

@@ -51,8 +51,9 @@ corrected_options = together(
     click.option(
         "--sector",
         type=float,
-        help="Of --guarantee sector: k of the circle criterion, below 1; |u| may reach (limit - k V)/(1 - k), V the "
-        f"control that the reference takes; {SECTOR:g} unless given.",
+        help="With --guarantee sector: k of the circle criterion, below 1. The guarantee covers |u| up to "
+        "(limit - k V)/(1 - k), where V is the largest control that the reference needs. "
+        f"Default: {SECTOR:g}.",
     ),
     click.option(
         "--bandwidth",
