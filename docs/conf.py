@@ -70,6 +70,7 @@ docscrape_sphinx.SandboxedEnvironment = lambda loader: TEMPLATES
 html_theme = "pydata_sphinx_theme"
 html_title = "Anti-windup"
 html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_theme_options = {
     "show_toc_level": 2,
@@ -104,6 +105,7 @@ def of_others(app: Sphinx, what: str, name: str, thing: object, skip: bool, opti
 
 def write_api_pages(app: Sphinx) -> None:
     """Write a page for each package of the rooms: what its modules hold, and the packages in it."""
+    API.mkdir(exist_ok=True)
     for room in ROOMS:
         for init in sorted((ROOT / room).rglob("__init__.py")):
             package, folder = ".".join(init.parent.relative_to(ROOT).parts), init.parent
