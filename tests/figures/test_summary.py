@@ -174,7 +174,8 @@ the scatter of the 2 tests by Student's distribution
 probability below 1e-06
 noise of 1.2 % of the response
 W_a = 0.3 (1 + s/40) / (1 + 2 0.2 s/60 + (s/60)^2)
-It is 3.25 times the largest of these distances on average and 12.5 times at most; no bound of this order gets below 11.7 times
+It is 3.25 times the largest of these distances on average and 12.5 times at most; no bound of this order gets
+below 11.7 times
 It touches day_0.csv at 55.5 rad/s
 run last at a limit [s] most asked for [mA]
 without anti-windup 3.12 12.5 0.875 1.5
@@ -368,7 +369,7 @@ def test_what_the_fit_leaves_is_said():
         misfit=fit.noise,
         cautions=(
             "a median distance of 25 % is more than noise leaves",
-            "no dead time can be told from none",
+            "the data show no dead time",
             f"{tests[0].name}: the plant misses the line at 2 Hz",
         ),
         agreement_of_tests=0.5,
@@ -384,7 +385,7 @@ def test_what_the_fit_leaves_is_said():
         "differ by no more: tests of one plant would differ as much with a probability of 0.5",
         "No other structure was tried. The deviance is divided by 19.5",
         "A median distance of 25 % is more than noise leaves.",
-        f"No dead time can be told from none. {tests[0].name}: the plant misses",
+        f"The data show no dead time. {tests[0].name}: the plant misses",
         "the intervals are widened for it",
         "finds 2 of their 4 modes, with omega within 2.5 % and zeta within 50 % of the fit.",
         "N4SID does not find the pole of 20 rad/s (day_0.csv), pole of 20 rad/s (day_1.csv).",
