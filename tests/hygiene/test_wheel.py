@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
@@ -20,6 +21,7 @@ from experiments.__main__ import main
 
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("identification", "design", "experiments", "paper_figures", "antiwindup", "data/thesis")
+VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet"]
 ASKED = ["--reference-omega", "1.5", "--a", "4", "--e", "2", "--f", "1"]
 
@@ -62,8 +64,10 @@ def test_the_wheel_works_from_any_folder(tree: Path, tmp_path: Path) -> None:
     (folder / "data").mkdir(parents=True)
     (folder / "data" / "mine.csv").touch()
     command = environment / "bin" / "antiwindup"
-    assert run(command, "--version", cwd=folder).stdout == "antiwindup, version 0.1.0\n"
-    assert run(python, "-m", "antiwindup", "--version", cwd=folder).stdout == "python -m antiwindup, version 0.1.0\n"
+    assert run(command, "--version", cwd=folder).stdout == f"antiwindup, version {VERSION}\n"
+    assert (
+        run(python, "-m", "antiwindup", "--version", cwd=folder).stdout == f"python -m antiwindup, version {VERSION}\n"
+    )
     for number, start in enumerate(([command, "design"], [python, "-m", "design"])):
         output = folder / f"design_{number}.json"
         done = run(*start, "extended", "implied", *ASKED, "--output", output, cwd=folder)
