@@ -71,6 +71,8 @@ docscrape_sphinx.SandboxedEnvironment = lambda loader: TEMPLATES
 # the site
 html_theme = "pydata_sphinx_theme"
 html_title = "Anti-windup"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_theme_options = {
     "show_toc_level": 2,
