@@ -184,4 +184,5 @@ def _build(asked: Asked, steps: Sequence[Step], wanted: Sequence[Step], goes_on:
     click.echo(build.printed.get("fit", ""), nl=False)
     for name, sentence in build.refused.items():
         click.echo(f"{name} was refused: {sentence}")
-    click.echo(f"{len(build.printed)} steps were run, {len(build.refused)} refused -> {asked.folder}")
+    ran = len(build.printed)
+    click.echo(f"{ran} step{' was' if ran == 1 else 's were'} run, {len(build.refused)} refused -> {asked.folder}")

@@ -2,10 +2,10 @@
 
 .venv/bin/python -m benchmarks.build_study --times 5 --only help --against ../another_checkout
 
-Each checkout is copied first, so that a module can be changed; with --against both are measured in turn. The commands
-are those of the Makefile, without the few milliseconds of make. CPU time is that of all processes, on Linux also of
-those that outlive the one that began them; the peak is that of the largest process. Both are nan where the command goes
-on after what is waited for.
+Each checkout is copied first, so that a module can be changed; with --against both are measured in turn, and a line
+gives the ratio of this one to the other in the same turn. The commands are those of the Makefile, without the few
+milliseconds of make. CPU time is that of all processes, on Linux also of those that outlive the one that began them;
+the peak is that of the largest process. Both are nan where the command goes on after what is waited for.
 """
 
 from __future__ import annotations
@@ -164,9 +164,12 @@ def main() -> None:
             measured(waits()[0], copy)  # compiled code gets warm, and each finds what it needs
         print(f"{'wait':34s}{'checkout':>10s}" + "".join(f"{each:>9s}{'quartiles':>18s}" for each in QUANTITIES))
         for wait in selected:
-            found = [{label: measured(wait, copy) for label, copy in copies.items()} for _ in range(asked.times)]
-            for label in copies:
-                parts = np.percentile([each[label] for each in found], (50, 25, 75), axis=0).T
+            turns = np.array([[measured(wait, copy) for copy in copies.values()] for _ in range(asked.times)])
+            found = {label: turns[:, number] for number, label in enumerate(copies)}
+            if asked.against:
+                found["ratio"] = turns[:, 0] / turns[:, 1]
+            for label, each in found.items():
+                parts = np.percentile(each, (50, 25, 75), axis=0).T
                 rows.append([wait.name, label, *parts.ravel()])
                 said = (f"{middle:9.2f}{f'{low:.2f} ... {high:.2f}':>18s}" for middle, low, high in parts)
                 print(f"{wait.name:34s}{label:>10s}" + "".join(said), flush=True)

@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +23,7 @@ from tqdm import tqdm
 
 from data.thesis import model_named
 from design.chapters_3_4.design_extended import design_extended
+from experiments.engine.compiled_loop import compile_loop
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import simulate
 from experiments.runs.design_loop import design_loop
@@ -36,7 +39,7 @@ LONG_S = 120.0
 """Runs at least as long give the slope: shorter ones are mostly preparation and the first second, full of events."""
 PAIRS = range(1, 9)
 PLANTS = 5  # for each number of pairs
-DELAYS_S = (0.5e-3, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3)
+DELAYS_S = (0.0, 1e-9, 1e-7, 1e-6, 1e-5, 4e-5, 1e-4, 0.5e-3, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3)
 FASTEST = 900.0  # rad/s, the last mode of every random plant, so that only the number of modes differs
 ROUNDS = 7
 
@@ -76,11 +79,12 @@ def main() -> None:
     print_table("horizon s", by_horizon)
     print_table(f"mode pairs ({PLANTS} random plants each, {HORIZON_S:g} s)", by_pairs)
     print_table(f"dead time s ({HORIZON_S:g} s)", by_delay)
+    print_shares(*saturated_loop(implied))
     print(f"slope of log cost over log horizon from {LONG_S:g} s on: {slope:.3f}")
     medians = np.array([found.median for found in by_horizon.values()])
     each, first = np.polyfit(list(by_horizon), medians, 1, w=1 / medians)
     print(f"cost of a run: {1e3 * first:.3g} ms and {1e3 * each:.3g} ms for each second")
-    figure = draw(by_horizon, by_pairs, {1e3 * delay: found for delay, found in by_delay.items()}, slope)
+    figure = draw(by_horizon, by_pairs, {1e3 * delay: found for delay, found in by_delay.items() if delay > 0}, slope)
     for ending in ("pdf", "png"):
         figure.savefig(folder / f"closed_loop_cost.{ending}", dpi=200)
     print(f"-> {folder / 'closed_loop_cost.pdf'}, .png")
@@ -114,6 +118,30 @@ def cost(loop: SaturatedLoop, limit: float, horizon_s: float) -> Cost:
         seconds.append(time.perf_counter() - start)
     lower, median, upper = np.quantile(seconds, [0.25, 0.5, 0.75])
     return Cost(float(median), float(lower), float(upper))
+
+
+def print_shares(loop: SaturatedLoop, limit: float) -> None:
+    """Print where the processor time of a run goes that is sampled every millisecond, by leaving parts out."""
+    every, ends = np.linspace(0.0, HORIZON_S, round(1000 * HORIZON_S) + 1), np.array([0.0, HORIZON_S])
+    parts = [partial(simulate, loop, (-limit, limit), every), partial(simulate, loop, (-limit, limit), ends)]
+    whole, unsampled, prepared = (median_of(part) for part in (*parts, partial(compile_loop, loop)))
+    print(f"where {1e3 * whole:.3g} ms of {HORIZON_S:g} s go, all signals sampled every millisecond:")
+    for name, seconds in [
+        ("equations and tables", prepared),
+        ("steps and events", unsampled - prepared),
+        ("samples", whole - unsampled),
+    ]:
+        print(f"  {name:20s}  {1e3 * seconds:8.3f} ms  {seconds / whole:4.0%}")
+
+
+def median_of(call: Callable[[], object]) -> float:
+    """The median processor seconds of a call, after a first one."""
+    seconds = []
+    for _ in range(1 + ROUNDS):
+        start = time.process_time()
+        call()
+        seconds.append(time.process_time() - start)
+    return float(np.median(seconds[1:]))
 
 
 def across(plants: list[Cost]) -> Cost:

@@ -70,8 +70,9 @@ def straight_code(loop: CompiledLoop) -> str:
     A row of the loop without saturation that B enters is written with u in the place of m, where that is shorter.
     """
     n, k, watched = len(loop.x0), len(loop.delays), len(loop.reads)
-    free, limited = (_dense(rows, n + 1 + k) for rows in (loop.unsaturated, loop.saturated))
-    most = loop.tables.polynomials.shape[1] // len(loop.unsaturated.indptr[n + 1 :]) - 1
+    signals = loop.tables.magnitudes.shape[1]
+    free, limited = np.split(_dense(loop.rows, n + 1 + k)[: 2 * (n + signals)], 2)
+    most = loop.tables.polynomials.shape[1] // signals - 1
     lines = [f"#define {name} {value}" for name, value in (("N", n), ("K", k), ("WATCHED", watched), ("MOST", most))]
     for mode, rows in enumerate((free, limited)):
         rates = []

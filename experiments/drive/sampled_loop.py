@@ -290,7 +290,9 @@ def _actuator(drive: Drive, command: np.ndarray, start: np.ndarray) -> np.ndarra
     """The actuator's output at the sampling instants from the commands (s,) and where it stands as each is issued."""
     whole, rest = split(min(drive.input_delay_s, (len(command) + 2) / drive.rate_hz), 1 / drive.rate_hz)
     late, since = (whole + 1, (1 - rest) / drive.rate_hz) if rest else (whole, 0.0)
-    reach = drive.rate_limit * since if math.isfinite(drive.rate_limit) else math.inf
-    moved = start + np.clip(command - start, -reach, reach)
+    moved = command
+    if math.isfinite(drive.rate_limit):
+        reach = drive.rate_limit * since
+        moved = start + np.clip(command - start, -reach, reach)
     before = np.full(min(late, len(moved)), start[0])
     return np.concatenate([before, moved[: len(moved) - len(before)]])

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from experiments.engine.brief_dead_times import DERIVATIVES, derived, with_brief
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.step_table import Rows, Tables, compressed, tabulate, whole_lanes
 from identification.base.errors import InputError
 
 FURTHEST = 4.0  # fastest root times step: the terms of a series grow to exp of it, and two digits are lost
-BRIEF = 0.01  # a dead time shorter than so much of the fastest root's time constant is no longer than a step
 
 
 class CompiledLoop(NamedTuple):
@@ -21,19 +21,19 @@ class CompiledLoop(NamedTuple):
 
     Parameters
     ----------
-    unsaturated
-        Over (x (n,), m, w (k,)): n rows [A + B C, 0, D + B E], the loop without saturation, a row [C 0 E], k rows
-        [Z 0 0], and o rows [. 0 0] of what is watched; and where a signal has m itself in it, that of the mode.
-    saturated
-        The same with n rows [A B D].
-    slewing, stopped
-        The same of an actuator with a rate limit while it slews, u between the limits and beyond: the last two states
-        are the rate and the actuator's output, and the constant is sat(u). Otherwise not used.
+    rows
+        Over (x (n,), m, w (k,)), modes one after the other, each of n rows, a row of u, k rows of what is delayed and
+        o rows of what is watched: [A + B C, 0, D + B E], the loop without saturation, [C 0 E], [Z 0 0], [. 0 0], and
+        where a signal has m itself in it, that of the mode; then the same of the saturated loop, with n rows [A B D];
+        and where the actuator has a rate limit the same while it slews, u between the limits and beyond: the last two
+        states are the rate and the actuator's output, and the constant is sat(u). All that again for each of ``brief``,
+        with its dead times and those below taken for the present, see :mod:`experiments.engine.brief_dead_times`.
     tables
         Of these, see :class:`experiments.engine.step_table.Tables`, for the signals u, Z x and what is watched.
     delays, brief, x0
-        Shapes (k,), (k,), (n,); delays positive. Where ``brief``, the loop is that with a dead time of zero, and w_j
-        stands for what the dead time changes, Z_j x(t - h_j) - Z_j x(t).
+        Shapes (k,), (b,), (n,); delays positive, and those of them, increasing, that do not set the step.
+    derived
+        Shape (tables, k, k, derivatives): what the brief dead times have of the others' signals.
     step
         The tables', in seconds, not more than any dead time that is not brief.
     groups, reads, lags
@@ -43,14 +43,12 @@ class CompiledLoop(NamedTuple):
         Shape (outputs, watched): makes the loop's outputs of what is watched.
     """
 
-    unsaturated: Rows
-    saturated: Rows
-    slewing: Rows
-    stopped: Rows
+    rows: Rows
     tables: Tables
     delays: np.ndarray
     brief: np.ndarray
     x0: np.ndarray
+    derived: np.ndarray
     step: float
     groups: np.ndarray
     reads: np.ndarray
@@ -61,7 +59,6 @@ class CompiledLoop(NamedTuple):
 def compile_loop(
     loop: SaturatedLoop,
     most_step: float = np.inf,
-    most_brief: float = BRIEF,
     idle_step: float = 1.0,
     slews: bool = False,
 ) -> CompiledLoop:
@@ -69,9 +66,8 @@ def compile_loop(
 
     The step is set by the fastest eigenvalue of the loop, saturated or not, and by the shortest dead time that is not
     brief, of which it is a whole part: then most delayed polynomials are read where they start. It is halved until all
-    series end. A dead time is brief up to ``most_brief`` time constants of the fastest eigenvalue: the loop is taken
-    without it, and what it changes is found in each step. Where nothing sets a step, ``idle_step`` seconds are one.
-    ``slews`` says that the last two states are those of an actuator with a rate limit.
+    series end. Where nothing sets a step, ``idle_step`` seconds are one. ``slews`` says that the last two states are
+    those of an actuator with a rate limit.
     """
     now, direct = loop.delays == 0, _direct(loop)
     if np.any(loop.E[now] @ direct[now] != 0):
@@ -80,12 +76,6 @@ def compile_loop(
     of_m, of_now, of_u = (loop.D[:, now] @ direct[now]).T
     A, B, by_u = A + np.outer(of_u, C), loop.B + of_m + of_now, np.outer(of_u, loop.E)
     D, E, Z, direct, delays = _merged(replace(loop, D=loop.D + by_u), direct)
-    fastest = _fastest(A, B, C)
-    brief = (delays * fastest <= most_brief) & ~direct.any(axis=1)
-    if brief.any():
-        brief &= delays * _fastest(A + D @ Z, B, C + E @ Z) <= most_brief
-        A, C = A + D[:, brief] @ Z[brief], C + E[brief] @ Z[brief]
-        fastest = _fastest(A, B, C)
     n, k = len(loop.x0), len(delays)
     watched, watched_direct, groups, lags, reading = _watched(loop)
     # what u - sat(u) drives is driven by zeros in the loop without saturation, and not by rounding
@@ -93,15 +83,14 @@ def compile_loop(
     rows, reads = _each_once(np.hstack([Z, direct]), np.hstack([watched, watched_direct]))
     u, signals, (of_m, of_limited, of_u) = np.concatenate([C, [0.0], E]), rows[:, :n], rows[:, n:].T
 
-    def mode(A: np.ndarray, constant: np.ndarray, D: np.ndarray, m: np.ndarray, limited: np.ndarray) -> Rows:
+    def mode(A: np.ndarray, constant: np.ndarray, D: np.ndarray, m: np.ndarray, limited: np.ndarray) -> np.ndarray:
         """Where m and sat(u) are rows over (x, the constant, w)."""
         read = np.hstack([signals, np.zeros((len(signals), 1 + k))]) + np.outer(of_m, m)
         read += np.outer(of_limited, limited) + np.outer(of_u, u)
-        return compressed(np.vstack([np.hstack([A, constant[:, None], D]), u, read]))
+        return np.vstack([np.hstack([A, constant[:, None], D]), u, read])
 
     units = np.eye(n + 1 + k)
-    unsaturated, saturated = mode(free_A, np.zeros(n), free_D, u, u), mode(A, B, D, units[n], units[n])
-    modes = [unsaturated, saturated]
+    modes = [mode(free_A, np.zeros(n), free_D, u, u), mode(A, B, D, units[n], units[n])]
     if slews:
         m, knows = np.eye(n)[-1], (np.zeros(n) if loop.B_limits is None else loop.B_limits) + of_now
         moved = A + np.outer(B - knows, m) + np.outer(m, np.eye(n)[-2])
@@ -111,37 +100,38 @@ def compile_loop(
             mode(moved, knows, D, units[n - 1], units[n]),
         ]
 
+    every, presents, brief, fastest = with_brief(modes, n, delays)
+    setting = delays[delays > brief.max(initial=0.0)]
     step = min(FURTHEST / fastest if fastest > 0 else np.inf, most_step)
-    if not brief.all():
-        shortest = float(delays[~brief].min())
-        step = shortest / max(np.ceil(shortest / step), 1.0)
+    if len(setting) > 0:
+        step = setting.min() / max(np.ceil(setting.min() / step), 1.0)
     elif np.isinf(step):
         step = idle_step  # of integrators alone, whose series end by themselves
     while True:
-        tabulated = [tabulate(rows, n, k, step) for rows in modes]
+        # without delayed signals where all are a function of the present
+        late = [0 if i >= len(modes) * len(np.unique(delays)) else k for i in range(len(every))]
+        tabulated = [
+            tabulate(compressed(rows[:, : n + 1 + own]), n, own, step) for rows, own in zip(every, late, strict=True)
+        ]
         if all(degree >= 0 for _, degree in tabulated):
             break
         step /= 2
+    rest = np.zeros((len(every), k, k, DERIVATIVES + 1))
+    for i, S in enumerate(presents):
+        rest[len(modes) + i] = derived(n, delays <= brief[i // len(modes)], S, delays, step)
     return CompiledLoop(
-        unsaturated=unsaturated,
-        saturated=saturated,
-        slewing=modes[-2],
-        stopped=modes[-1],
+        rows=compressed(np.vstack(every)),
         tables=Tables(*(_stacked(alike) for alike in zip(*(tables for tables, _ in tabulated), strict=True))),
         delays=delays,
         brief=brief,
         x0=loop.x0,
+        derived=rest,
         step=step,
         groups=groups,
         reads=1 + reads,
         lags=lags,
         reading=reading,
     )
-
-
-def _fastest(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> float:
-    """The largest modulus of an eigenvalue of the loop, saturated (A) or not (A + B C), in rad/s."""
-    return max(float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in (A, A + np.outer(B, C)))
 
 
 def _direct(loop: SaturatedLoop) -> np.ndarray:
@@ -158,7 +148,7 @@ def _merged(loop: SaturatedLoop, direct: np.ndarray) -> tuple[np.ndarray, ...]:
     first = [alike[0] for alike in entering.values()]
     Z = np.array([loop.Z[alike].sum(axis=0) for alike in entering.values()]).reshape(len(first), len(loop.x0))
     summed = np.array([direct[alike].sum(axis=0) for alike in entering.values()]).reshape(len(first), 3)
-    return loop.D[:, first], loop.E[first], Z, summed, loop.delays[first]
+    return loop.D[:, first], loop.E[first], Z, summed, loop.delays[first].astype(float)
 
 
 def _watched(loop: SaturatedLoop) -> tuple[np.ndarray, ...]:

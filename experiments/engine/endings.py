@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-TRIALS = 30  # in which what brief dead times change settles,
-SETTLED = 4.0  # of what is negligible, when it moves by no more than that
 DIVERGENT = 1e100  # times the limits, or without limits of a state: beyond it a loop diverges
 ENORMOUS = 1e250  # a state with which no run goes on, whatever the limits
 
-COMPLETE, DIVERGED, ENDLESS, CROWDED, EVENTFUL, UNSETTLED, STOPPED = 0, 1, 2, 3, 4, 5, 6
+COMPLETE, DIVERGED, ENDLESS, CROWDED, EVENTFUL, STOPPED = 0, 1, 2, 3, 4, 5
 
 
 class Bounds(NamedTuple):

@@ -13,8 +13,8 @@ import numpy as np
 
 from experiments.engine import endings
 from experiments.engine.compiled_loop import CompiledLoop
-from experiments.engine.kinks import BEYOND, Past, drop, images, shift
-from experiments.engine.signals import AT_ONCE, change, driven, evaluate, expand, fill, unfold
+from experiments.engine.kinks import BEYOND, Past, agrees, drop, images, shift
+from experiments.engine.signals import AT_ONCE, derive, driven, evaluate, expand, fill, unfold
 from experiments.engine.slewing import direction, leaves_actuator_mode, place
 from experiments.engine.step_table import NEGLIGIBLE, NOTHING, advance, dot, times, whole_lanes
 from experiments.engine.watched import REACHED, STOP
@@ -52,18 +52,19 @@ def integrate(
     -------
     values (1 + o, s), events (e,), modes (e,), places (e,), status, end, steps, tail
         u and what is watched at the samples; event times with the mode entered (:mod:`experiments.engine.slewing`)
-        and m there; COMPLETE, DIVERGED, ENDLESS (too many steps), CROWDED (too little room), EVENTFUL, UNSETTLED (a
-        brief dead time is too long) or STOPPED; the time reached; the number of steps; the largest last term of a
+        and m there; COMPLETE, DIVERGED, ENDLESS (too many steps), CROWDED (too little room), EVENTFUL or
+        STOPPED; the time reached; the number of steps; the largest last term of a
         signal's polynomial, as a share of the largest that the signal was.
     """
-    unsaturated, saturated, slewing, stopped, tables, delays, brief, x0, step, groups, reads, _, _ = loop
+    rows, tables, delays, brief, x0, derived, step, groups, reads, _, _ = loop
     slews, slope = rate < np.inf, rate * step
     n, k, room = len(x0), len(delays), bounds.room
     limit = max(abs(low) if np.isfinite(low) else 0.0, abs(high) if np.isfinite(high) else 0.0)
     most_u, most_x = (endings.DIVERGENT * limit, endings.ENORMOUS) if limit > 0 else (np.inf, endings.DIVERGENT)
     increments, polynomials = tables.increments, tables.polynomials
-    indptr, indices, data = saturated  # what is not yet there is read of a standing actuator
-    signals = len(indptr) - 1 - n
+    indptr, indices, data = rows
+    signals, standard = tables.magnitudes.shape[1], len(increments) // (1 + len(brief))  # modes
+    saturated = n + signals  # the first of its rows: what is not yet there is read of a standing actuator
     most = polynomials.shape[1] // signals - 1
     values, sample = np.zeros((1 + len(reads), samples.shape[1])), np.zeros(len(samples), np.int64)
     events, modes, event_count = np.empty(bounds.events), np.empty(bounds.events, np.int64), 0
@@ -75,30 +76,28 @@ def integrate(
     wrap = room - 1
     cursor, filled = np.zeros(k, np.int64), np.zeros(k, np.int64)
     queue, queued = np.empty(room), 0  # mesh points to come: the images of kinks
-    # until when a brief dead time reaches back beyond a kink, and to what
-    fresh, past, some_brief = np.zeros(k), np.zeros((k, most + 1)), brief.any()
 
-    z, P, W = np.zeros(increments.shape[2]), np.zeros((1 + k, most + 1)), np.zeros(most + 1)
+    z, P, W = np.zeros(increments.shape[2]), np.zeros((signals, most + 1)), np.zeros(most + 1)
     sizes, terms, later, negligible = np.zeros(len(z)), np.zeros(n), np.zeros(n), np.zeros(1 + k)
     work = np.zeros((2, most + 1))
     U, V = P[0], np.zeros((most + 1, n + 1 + k))
     V[0, :n], V[0, n] = x0, min(max(0.0, low), high)
-    rest = np.array([times(indptr, indices, data, n + 1 + j, V, 0) for j in range(k)])
+    rest = np.array([times(indptr, indices, data, saturated + n + 1 + j, V, 0) for j in range(k)])
     remembered = Past(starts, lates, degrees, history, rest, queue)
-    V[0, n + 1 :] = np.where(brief, 0.0, rest)
-    x, scale, size = x0.copy(), np.abs(x0), np.zeros(1 + k)
-    size[1:] = np.abs(rest)
+    V[0, n + 1 :] = rest
+    x, scale, size = x0.copy(), np.abs(x0), np.zeros(signals)
+    size[1 : 1 + k] = np.abs(rest)
     last = np.zeros(1 + k)
-    seen = np.zeros(signals - 1 - k)  # of what is watched
-    shown, tops = np.zeros((len(values), most + 1)), np.zeros(len(values), np.int64)
+    tops, unfolded = np.zeros(signals, np.int64), np.zeros(signals, np.int64)  # degrees, and in which step
     taus, found = np.zeros(AT_ONCE), np.zeros(AT_ONCE)
-    u = times(indptr, indices, data, n, V, 0)
+    u = times(indptr, indices, data, saturated + n, V, 0)
     mode = 0 if slews else (1 if u > high else (-1 if u < low else 0))
     kink, on_limit, roots, standing = True, 0, 0, 0
+    level, longest = 0, brief.max() if len(brief) > 0 else 0.0
     for g in range(len(samples)):
         while sample[g] < samples.shape[1] and samples[g, sample[g]] < 0:
             for o in range(groups[g], groups[g + 1]):
-                values[1 + o, sample[g]] = times(indptr, indices, data, n + reads[o], V, 0)
+                values[1 + o, sample[g]] = times(indptr, indices, data, saturated + n + reads[o], V, 0)
             sample[g] += 1
     V[0, n] = 0.0
     t, late, reset, status, steps, usual = 0.0, 0.0, 0, endings.COMPLETE, 0, 0  # the time is t + late, lest it drifts
@@ -118,67 +117,52 @@ def integrate(
         if reset < len(reset_times) and reset_times[reset] < t_next:
             t_next = reset_times[reset]
 
-        for j in range(k):
-            if brief[j] and kink and delays[j] > 1e-13 * (step + t):
-                fresh[j] = t + delays[j]
-            if brief[j] and t < fresh[j]:
-                t_next = min(t_next, fresh[j])
-        known = 0
-        for j in range(k):
-            for i in range(filled[j] + 1):
-                z[n + 1 + k * i + j] = 0.0
-            filled[j] = 0
-            start = t - delays[j]
-            middle = start + 0.5 * (t_next - t)  # decides the piece: the ends may lie on a kink
-            while cursor[j] + 1 < pieces and starts[(cursor[j] + 1) & wrap] <= middle:
-                cursor[j] += 1
-            if brief[j] and t >= fresh[j]:
-                continue
-            if middle < 0:
-                W[0], degree = rest[j], 0
-            else:
-                piece = cursor[j] & wrap
-                if starts[piece] + radii[piece] * step + delays[j] < t_next - 1e-9 * step:
-                    t_next = starts[piece] + radii[piece] * step + delays[j]
-                degree = degrees[piece]
-                for i in range(degree + 1):
-                    W[i] = history[piece, j, i]
-                moved = start - starts[piece] + (late - lates[piece])
-                if abs(moved) > 4e-16 * (step + t):  # else the same time, to rounding
-                    shift(W, degree, moved / step, work)
-            if brief[j]:
-                past[j] = 0.0
-                for i in range(degree + 1):
-                    past[j, i] = W[i]
-                continue
-            filled[j] = fill(z, n, k, j, W, degree, min(1.0, (t_next - t) / step + BEYOND), NEGLIGIBLE * size[1 + j])
-            known = max(known, filled[j])
-
         side = direction(mode)
         beyond = mode - 3 * side  # which limit u is
-        which = abs(beyond) + 2 * abs(side)
         if slews:
             x[n - 2] = side * rate
         for r in range(n):
             z[r] = x[r]
         z[n] = 0.0 if beyond == 0 else (high if beyond == 1 else low)
-        radius = min(1.0, (t_next - t) / step + BEYOND)
-        degree, power = unfold(tables, which, k, z, sizes, known, radius, usual, size, negligible, P, terms)
-        for trial in range(endings.TRIALS if some_brief else 0):
-            settled = True
+        settled, planned = (0 if kink else level), t_next
+        for level in range(len(brief), -1, -1):  # as many brief dead times as may be are taken for the present
+            present = brief[level - 1] if level > 0 else 0.0
+            t_next = min(planned, t + brief[level]) if level < len(brief) else planned
+            known = 0
             for j in range(k):
-                if brief[j]:
-                    ago = delays[j] / step if t >= fresh[j] else 0.0  # before a kink's image, what it was is known
-                    within = change(z, n, k, j, past[j], ago, P[1 + j], degree, radius, size[1 + j], filled, W, work)
-                    settled = settled and within <= endings.SETTLED * negligible[1 + j]
-            known = filled.max()
+                for i in range(filled[j] + 1):
+                    z[n + 1 + k * i + j] = 0.0
+                filled[j] = 0
+                start = t - delays[j]
+                middle = start + 0.5 * (t_next - t)  # decides the piece: the ends may lie on a kink
+                while cursor[j] + 1 < pieces and starts[(cursor[j] + 1) & wrap] <= middle:
+                    cursor[j] += 1
+                if delays[j] <= present:
+                    continue
+                if middle < 0:
+                    W[0], degree = rest[j], 0
+                else:
+                    piece = cursor[j] & wrap
+                    if starts[piece] + radii[piece] * step + delays[j] < t_next - 1e-9 * step:
+                        t_next = starts[piece] + radii[piece] * step + delays[j]
+                    degree = degrees[piece]
+                    for i in range(degree + 1):
+                        W[i] = history[piece, j, i]
+                    moved = start - starts[piece] + (late - lates[piece])
+                    if abs(moved) > 4e-16 * (step + t):  # else the same time, to rounding
+                        shift(W, degree, moved / step, work)
+                radius = min(1.0, (t_next - t) / step + BEYOND)
+                filled[j] = fill(z, n, k, j, W, degree, radius, NEGLIGIBLE * size[1 + j])
+                known = max(known, filled[j])
+            which = level * standard + abs(beyond) + 2 * abs(side)
+            if level > 0:
+                known = derive(z, n, k, derived[which], filled)
+            radius = min(1.0, (t_next - t) / step + BEYOND)
             degree, power = unfold(tables, which, k, z, sizes, known, radius, usual, size, negligible, P, terms)
-            if settled:
+            if level <= settled or agrees(
+                remembered, pieces, delays, present, t, late, step, P, degree, negligible, W, work
+            ):
                 break
-            if trial == endings.TRIALS - 1:
-                status = endings.UNSETTLED
-        if status == endings.UNSETTLED:
-            break
         columns = whole_lanes(n + 1 + k * (known + 1))
         usual = degree
         if degree == most:  # a delayed signal may have terms beyond
@@ -209,7 +193,7 @@ def integrate(
                 for i in range(degree + 1):
                     history[piece, j, i] = P[1 + j, i]
             if kink:
-                queued = images(remembered, pieces, queued, delays, brief, step, negligible, W, work)
+                queued = images(remembered, pieces, queued, delays, present, longest, step, negligible, W, work)
                 kink = False
             pieces += 1
 
@@ -221,23 +205,21 @@ def integrate(
                 continue
             sample[g] = until
             for o in range(-1 if g == 0 else groups[g], groups[g + 1]):
-                tops[1 + o], signal = degree, 0 if o < 0 else reads[o]
+                signal = 0 if o < 0 else reads[o]
                 if signal <= k:
-                    for i in range(degree + 1):
-                        shown[1 + o, i] = P[signal, i]
-                else:
-                    tops[1 + o] = expand(
-                        tables, which, signal, signals, z, sizes, columns, degree, most, terms, later, seen,
-                        signal - 1 - k, shown, 1 + o,
-                    )  # fmt: skip
+                    tops[signal] = degree
+                elif unfolded[signal] < steps:
+                    unfolded[signal] = steps
+                    tops[signal] = expand(tables, which, signal, k, z, sizes, known, degree, terms, later, size, P)
             for at in range(begin, until, AT_ONCE):
                 several = min(AT_ONCE, until - at)
                 for q in range(several):
                     taus[q] = (samples[g, at + q] - t - late) / step
-                for o in range(0 if g == 0 else 1 + groups[g], 1 + groups[g + 1]):
-                    evaluate(shown, o, tops[o], taus, found)
+                for o in range(-1 if g == 0 else groups[g], groups[g + 1]):
+                    signal = 0 if o < 0 else reads[o]
+                    evaluate(P, signal, tops[signal], taus, found)
                     for q in range(several):
-                        values[o, at + q] = found[q]
+                        values[1 + o, at + q] = found[q]
 
         m = place(U, degree, mode, low, high, x[n - 1], slope, reach) if slews and reach > 0 else x[n - 1]
         if reach == 1.0:
@@ -249,8 +231,8 @@ def integrate(
                     V[i, n + 1 + j] = z[n + 1 + k * i + j]
             V[0, : n + 1] = z[: n + 1]
             matter = driven(z, n, filled, size, reach)
-            rows = (unsaturated if which == 0 else saturated) if side == 0 else (slewing if which == 2 else stopped)
-            advance(rows, tables.influence[which, signals:], V, n, matter, most, scale, step, reach, x)
+            first = which * (n + signals)
+            advance(rows, first, tables.influence[which, signals:], V, n, matter, most, scale, step, reach, x)
             V[: known + 1, n + 1 :] = 0.0
         if slews:
             x[n - 1] = m

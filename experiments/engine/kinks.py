@@ -91,26 +91,59 @@ def largest_difference(
 
 @njit(nogil=True)
 def images(
-    past: Past, pieces: int, queued: int, delays: Array, brief: Array, step: float, negligible: Array, W: Array,
-    work: Array,
+    past: Past, pieces: int, queued: int, delays: Array, present: float, brief: float, step: float, negligible: Array,
+    W: Array, work: Array,
 ) -> int:  # fmt: skip
     """Queue the images of a kink at the start of the latest step, which is number ``pieces``; the queue's new length.
 
-    None is where the two sides of the kink agree to what is ``negligible`` (1 + k,), as far as they are read.
+    None is where the two sides of the kink agree to what is ``negligible`` (1 + k,), as far as they are read, and none
+    of what is delayed by ``present`` or less, which is a function of the present already.
     """
-    starts, lates, degrees, history, rest, queue = past
-    this, left = pieces & (len(starts) - 1), (pieces - 1) & (len(starts) - 1)
-    t = starts[this]
+    this, queue = pieces & (len(past.starts) - 1), past.queue
+    t = past.starts[this]
     for j in range(len(delays)):
-        W[0], before, moved = rest[j], 0, 0.0
-        if pieces > 0:
-            before, moved = degrees[left], (t - starts[left] + (lates[this] - lates[left])) / step
-            for i in range(before + 1):
-                W[i] = history[left, j, i]
-        read = delays[j] / step if brief[j] else BEYOND
-        if largest_difference(W, before, moved, history[this, j], degrees[this], read, work) > negligible[1 + j]:
+        if delays[j] <= present:
+            continue
+        before, moved = recalled(past, pieces - 1, j, t, past.lates[this], step, W)
+        read = delays[j] / step if delays[j] <= brief else BEYOND
+        right, degree = past.history[this, j], past.degrees[this]
+        if largest_difference(W, before, moved, right, degree, read, work) > negligible[1 + j]:
             queued = insert(queue, queued, t + delays[j], 1e-13 * (step + t))
     return queued
+
+
+@njit(nogil=True)
+def recalled(past: Past, number: int, j: int, t: float, late: float, step: float, W: Array) -> tuple[int, float]:
+    """Fill W with a source in a step; its degree, and how many steps before the time t + late it starts."""
+    if number < 0:
+        W[0] = past.rest[j]
+        return 0, 0.0
+    piece = number & (len(past.starts) - 1)
+    for i in range(past.degrees[piece] + 1):
+        W[i] = past.history[piece, j, i]
+    return past.degrees[piece], (t - past.starts[piece] + (late - past.lates[piece])) / step
+
+
+@njit(nogil=True)
+def agrees(
+    past: Past, pieces: int, delays: Array, present: float, t: float, late: float, step: float, P: Array, degree: int,
+    negligible: Array, W: Array, work: Array,
+) -> bool:  # fmt: skip
+    """Whether the sources of dead times up to ``present`` were, in the last dead time, what P (1 + k, .) says.
+
+    The polynomials P start at t + late, before which are ``pieces`` steps; to what is ``negligible`` (1 + k,).
+    """
+    for j in range(len(delays)):
+        if not 1e-13 * (step + t) < delays[j] <= present:
+            continue
+        number, reached = pieces, 0.0
+        while number >= 0 and reached < delays[j] * (1 - 1e-9):
+            number -= 1
+            before, moved = recalled(past, number, j, t, late, step, W)
+            if largest_difference(W, before, moved, P[1 + j], degree, delays[j] / step, work) > negligible[1 + j]:
+                return False
+            reached = moved * step
+    return True
 
 
 @njit(nogil=True)

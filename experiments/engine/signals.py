@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.engine.kinks import shift
+from experiments.engine.kinks import FACTORIAL, INVERSE
 from experiments.engine.step_table import NEGLIGIBLE, NOTHING, ROUNDING, Tables, dot, whole_lanes
 from identification.base.arrays import Array
 from identification.base.compiled import njit
@@ -53,31 +53,22 @@ def driven(z: Array, n: int, filled: Array, size: Array, reach: float) -> int:
 
 
 @njit(nogil=True)
-def change(
-    z: Array, n: int, k: int, j: int, past: Array, ago: float, now: Array, degree: int, radius: float, size: float,
-    filled: Array, W: Array, work: Array,
-) -> float:  # fmt: skip
-    """Put into z what a brief dead time changes of a signal; how much that differs from what z held before.
+def derive(z: Array, n: int, k: int, derived: Array, filled: Array) -> int:
+    """Add what the brief delayed signals have of the others, to which degrees z is ``filled`` (k,); the highest degree.
 
-    ``now`` (most + 1,) holds the signal's coefficients up to ``degree``. Before the dead time it was the same
-    polynomial ``ago`` steps earlier or, where that is 0, ``past`` (most + 1,). ``W`` (most + 1,) and ``work``
-    (2, most + 1) are room.
+    ``derived`` is (k, k, derivatives), see :func:`experiments.engine.brief_dead_times.derived`.
     """
-    most = len(now) - 1
-    for i in range(most + 1):
-        W[i] = past[i] if ago == 0 else (now[i] if i <= degree else 0.0)
-    if ago > 0:
-        shift(W, degree, -ago, work)
-    for i in range(degree + 1):
-        W[i] -= now[i]
-    for i in range(most + 1):
-        work[0, i], z[n + 1 + k * i + j] = z[n + 1 + k * i + j], 0.0
-    filled[j] = fill(z, n, k, j, W, most, radius, NEGLIGIBLE * size)
-    difference, power = 0.0, 1.0
-    for i in range(most + 1):
-        difference += abs(z[n + 1 + k * i + j] - work[0, i]) * power
-        power *= radius
-    return difference
+    known = 0
+    for q in range(k):
+        known = max(known, filled[q])
+    for j in range(k):
+        for q in range(k):
+            for i in range(filled[q] + 1 if derived[j, q, 0] != 0 else 0):
+                for order in range(min(derived.shape[2] - 1, filled[q] - i) + 1):
+                    higher = FACTORIAL[i + order] * INVERSE[i] * z[n + 1 + k * (i + order) + q]
+                    z[n + 1 + k * i + j] += derived[j, q, order] * higher
+                filled[j] = known
+    return known
 
 
 @njit(nogil=True)
@@ -85,12 +76,14 @@ def unfold(
     tables: Tables, which: int, k: int, z: Array, sizes: Array, known: int, radius: float, usual: int, size: Array,
     negligible: Array, P: Array, terms: Array,
 ) -> tuple[int, float]:  # fmt: skip
-    """Fill P (1 + k, most + 1) with the coefficients of u and Z x until all that follow are negligible up to a radius.
+    """Fill P[: 1 + k] with the coefficients of u and Z x until all that follow are negligible up to a radius.
 
     Parameters
     ----------
     tables, which
         Of both modes, and the mode's.
+    P
+        Shape (signals, most + 1).
     z, known, radius
         What the step begins with, the highest degree of a delayed signal in it, and how many steps far the polynomials
         are read.
@@ -105,7 +98,7 @@ def unfold(
     degree, power
         Of the last coefficient, and radius to that power.
     """
-    n, signals, most = len(terms), tables.magnitudes.shape[1], P.shape[1] - 1
+    n, signals, most = len(terms), len(P), P.shape[1] - 1
     columns = whole_lanes(n + 1 + k * (known + 1))
     for i in range(columns):
         sizes[i] = abs(z[i])
@@ -114,7 +107,7 @@ def unfold(
     quiet, power = 0, 1.0
     for degree in range(most + 1):
         small = degree > known
-        upto = columns if small else whole_lanes(n + 1 + k * (degree + 1))  # of the causes of this degree
+        upto = whole_lanes(n + 1 + k * (min(degree, known) + 1))  # of the causes of this degree
         for s in range(1 + k):
             c = dot(tables.polynomials, which, signals * degree + s, z, upto)
             if degree == 0:
@@ -135,37 +128,40 @@ def unfold(
 
 
 @njit(nogil=True, fastmath={"contract"})
-def evaluate(shown: Array, o: int, degree: int, taus: Array, found: Array) -> None:
-    """Fill found (AT_ONCE,) with the polynomial shown[o] of a degree at ``taus``."""
+def evaluate(P: Array, signal: int, degree: int, taus: Array, found: Array) -> None:
+    """Fill found (AT_ONCE,) with the polynomial P[signal] of a degree at ``taus``."""
     for q in range(AT_ONCE):
-        found[q] = shown[o, degree]
+        found[q] = P[signal, degree]
     for i in range(degree - 1, -1, -1):
         for q in range(AT_ONCE):
-            found[q] = found[q] * taus[q] + shown[o, i]
+            found[q] = found[q] * taus[q] + P[signal, i]
 
 
 @njit(nogil=True)
 def expand(
-    tables: Tables, which: int, signal: int, signals: int, z: Array, sizes: Array, columns: int, degree: int, most: int,
-    terms: Array, later: Array, size: Array, at: int, shown: Array, o: int,
+    tables: Tables, which: int, signal: int, k: int, z: Array, sizes: Array, known: int, degree: int, terms: Array,
+    later: Array, size: Array, P: Array,
 ) -> int:  # fmt: skip
-    """Fill shown[o] with a signal's coefficients until all that follow are negligible against its ``size[at]`` so far.
+    """Fill P[signal] with a signal's coefficients until all that follow are negligible against its ``size`` so far.
 
     ``sizes`` is abs(z); ``terms`` holds the absolute values of x's coefficients of the given ``degree``, beyond which
     delayed signals have none; ``later`` (n,) is room for those of higher degrees. Returns the degree.
     """
+    n, (signals, entries) = len(terms), P.shape
+    columns = whole_lanes(n + 1 + k * (known + 1))
     for i in range(degree + 1):
-        shown[o, i] = dot(tables.polynomials, which, signals * i + signal, z, columns)
-    size[at] = max(size[at], abs(shown[o, 0]))
-    negligible = max(NEGLIGIBLE * size[at], ROUNDING * dot(tables.magnitudes, which, signal, sizes, columns))
+        upto = whole_lanes(n + 1 + k * (min(i, known) + 1))
+        P[signal, i] = dot(tables.polynomials, which, signals * i + signal, z, upto)
+    size[signal] = max(size[signal], abs(P[signal, 0]))
+    negligible = max(NEGLIGIBLE * size[signal], ROUNDING * dot(tables.magnitudes, which, signal, sizes, columns))
     bound = following(tables, which, signal, degree, terms)
-    while degree < most and bound > negligible:
+    while degree < entries - 1 and bound > negligible:
         degree += 1
-        shown[o, degree] = dot(tables.polynomials, which, signals * degree + signal, z, columns)
+        P[signal, degree] = dot(tables.polynomials, which, signals * degree + signal, z, columns)
         state_terms(tables, which, degree, z, columns, later)
         bound = following(tables, which, signal, degree, later)
-    left_out = abs(shown[o, degree])
-    while degree > 0 and left_out <= ROUNDING * size[at]:
+    left_out = abs(P[signal, degree])
+    while degree > 0 and left_out <= ROUNDING * size[signal]:
         degree -= 1
-        left_out += abs(shown[o, degree])
+        left_out += abs(P[signal, degree])
     return degree

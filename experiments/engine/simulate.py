@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from experiments.engine import endings
-from experiments.engine.compiled_loop import BRIEF, FURTHEST, CompiledLoop, compile_loop
+from experiments.engine.compiled_loop import FURTHEST, CompiledLoop, compile_loop
 from experiments.engine.integrator import integrate
 from experiments.engine.ready_loop import ReadyLoop, ready_loop
 from experiments.engine.saturated_loop import SaturatedLoop
@@ -170,7 +170,7 @@ def simulate_watched(
     own, compiled, rate = ready.loop, ready.compiled, ready.rate
     slews = math.isfinite(rate)
     x0 = np.append(own.x0[:-1], np.clip(0.0, low, high)) if slews else own.x0
-    most_events, room, brief = 4096, _room(compiled), BRIEF
+    most_events, room = 4096, _room(compiled)
     while True:
         _require_affordable(compiled, room, horizon)
         values, events, modes, places, status, end, _, tail = integrate(
@@ -189,9 +189,8 @@ def simulate_watched(
             room *= 2
         elif status == endings.EVENTFUL:
             most_events *= 8
-        elif status == endings.UNSETTLED or (status == endings.COMPLETE and tail > TAIL):
-            brief = 0.0 if status == endings.UNSETTLED else brief
-            compiled = compile_loop(own, compiled.step / 2, brief, slews=slews)
+        elif status == endings.COMPLETE and tail > TAIL:
+            compiled = compile_loop(own, compiled.step / 2, slews=slews)
             room = max(room, _room(compiled))
         else:
             break
@@ -217,7 +216,8 @@ def simulate_watched(
 
 
 def _require_affordable(compiled: CompiledLoop, room: int, horizon: float) -> None:
-    step, shortest = compiled.step, min(map(float, compiled.delays[~compiled.brief]), default=math.inf)
+    step = compiled.step
+    shortest = float(compiled.delays[~np.isin(compiled.delays, compiled.brief)].min(initial=math.inf))
     asked = (
         f"the shortest dead time, {shortest:.3g} s, asks for"
         if step > shortest / 2

@@ -32,7 +32,7 @@ LANES = 16  # products of rows are taken in multiples of so many columns
 
 
 class Tables(NamedTuple):
-    """A step as tables, each of one loop, or with a leading axis of the unsaturated and the saturated one.
+    """A step as tables, each of one mode of a loop, or with a leading axis of several.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def whole_lanes(count: int) -> int:
 
 @njit(nogil=True, fastmath={"contract", "reassoc"})
 def dot(table: Array, which: int, row: int, z: Array, count: int) -> float:
-    """The first ``count`` entries of a row of one of two tables times those of z."""
+    """The first ``count`` entries of a row of one of several tables times those of z."""
     value = 0.0
     for c in range(count):
         value += table[which, row, c] * z[c]
@@ -202,10 +202,10 @@ def _ends(terms: Array, influence: Array, largest: Array, p: int) -> bool:
 
 @njit(nogil=True)
 def advance(
-    rows: Rows, influence: Array, V: Array, n: int, known: int, most: int, scale: Array, step: float, reach: float,
-    x: Array,
+    rows: Rows, first: int, influence: Array, V: Array, n: int, known: int, most: int, scale: Array, step: float,
+    reach: float, x: Array,
 ) -> None:  # fmt: skip
-    """x at tau = reach, term by term.
+    """x at tau = reach, term by term, by the n rows from ``first`` on.
 
     V (most + 1, n + 1 + k) holds the terms of (x, m, w): V[0] and the delayed signals, to the degree ``known``, are
     given; to which they matter. The sum ends where all that follows is negligible against the largest value of each
@@ -220,7 +220,7 @@ def advance(
         power *= reach
         negligible = i >= known
         for r in range(n):
-            term = factor * times(indptr, indices, data, r, V, i)
+            term = factor * times(indptr, indices, data, first + r, V, i)
             V[i + 1, r] = term
             term *= power
             x[r] += term

@@ -156,6 +156,9 @@ def judge_run(
         return found
     only_u = ready_loop(replace(loop, outputs={}))
     more = finely(loop, run, reference)
+    settles = steady_control(reference, plant, more)
+    if len(run.events_s) and run.modes[-1] == 0:  # from then on u needs no sector
+        more = more[: np.searchsorted(more, run.events_s[-1]) + 1]
     for _ in range(REFINEMENTS):
         time_s, first = np.unique(np.append(time_s, more), return_index=True)
         control = np.append(control, simulate(only_u, limits, more).control)[first]
@@ -166,6 +169,7 @@ def judge_run(
         at = at[at < len(time_s)]  # it may never be left
         around = time_s[np.clip(np.add.outer([-1, 1], at), 0, len(time_s) - 1)]
         more = np.unique(np.linspace(around[0], around[1], A_REFINEMENT))
+    found = replace(found, steady=(min(found.steady[0], settles.min()), max(found.steady[1], settles.max())))
     if given.sector < 1 or math.isinf(found.needed_sector):
         return found
     end = float(run.time_s[-1])

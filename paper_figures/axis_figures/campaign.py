@@ -34,9 +34,10 @@ UNSURE = 0.05  # a distribution function leaves its band as often as that
 def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the caption with the numbers of the tables."""
     summary, signals = tables["campaign_summary"], design.signals
+    plants = int(only(summary, "plants"))
     return (
-        f"SYNTHETIC: {int(only(summary, 'plants'))} plants drawn within W_a (seed {int(only(summary, 'seed'))}), each "
-        f"in the loop of the same design, under the limits {actuator_said(summary, signals.input_unit)}, for "
+        f"SYNTHETIC: {plants} plant{'s' if plants > 1 else ''} drawn within W_a (seed {int(only(summary, 'seed'))}), "
+        f"each in the loop of the same design, under the limits {actuator_said(summary, signals.input_unit)}, for "
         f"{duration(only(summary, 'horizon_s'))} of the reference. How they lie within W_a is a choice of the program, "
         "so the shares are no probabilities of a real plant. (a) to (c) The share of all the plants whose numbers are "
         "no larger: the greatest error after a quarter of the reference's period, that of the last period, and the "

@@ -11,6 +11,7 @@ from typing import Any
 
 import matplotlib.style
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -58,9 +59,9 @@ FAMILY = [name for name in LINES if name.startswith("family")]
 """The entries of the family, in the order of its values."""
 
 _METADATA: dict[str, dict[str, None]] = {
+    "png": {"Software": None},
     "pdf": {"CreationDate": None, "ModDate": None},
     "svg": {"Date": None},
-    "png": {"Software": None},
 }
 
 
@@ -88,7 +89,9 @@ def figure(width: float, height: float) -> Figure:
     Axes take their fonts from the style in force when they are added, so a drawing function as a whole
     is decorated with :func:`styled`.
     """
-    return Figure(figsize=(width, height))
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)  # which measures a text once, for the layout and for PNG
+    return figure
 
 
 def panel_letters(axes: Iterable[Axes]) -> None:
@@ -122,24 +125,25 @@ def rendered(figure: Figure, folder: Path, name: str, caption: str) -> dict[Path
         The caption, paragraphs of printable text.
     """
     files = {folder / f"{name}.txt": f"{printable_lines(caption)}\n".encode()}
-    _escape(figure)
-    for kind in _METADATA:
-        files[folder / f"{name}.{kind}"] = _rendered_as(figure, kind)
-        with matplotlib.style.context("default"):
-            figure.set_layout_engine()  # none any more
-    return files
+    _lay_out(figure)
+    return files | {folder / f"{name}.{kind}": _rendered_as(figure, kind) for kind in _METADATA}
 
 
 def figure_writer(figure: Figure) -> Callable[[Path], object]:
     """What writes a figure, as PDF, SVG or PNG by the suffix of the path, the same bytes from run to run."""
-    _escape(figure)
+    _lay_out(figure)
     return lambda path: path.write_bytes(_rendered_as(figure, path.suffix[1:].lower()))
 
 
-def _escape(figure: Figure) -> None:
+def _lay_out(figure: Figure) -> None:
+    """Escape what does not print, and place the panels; Matplotlib itself would draw all that it saves once more."""
     for text in figure.findobj(Text):
         if (escaped := printable_lines(text.get_text())) != text.get_text():
             text.set_text(escaped)
+    with styled():
+        if (engine := figure.get_layout_engine()) is not None:
+            engine.execute(figure)
+        figure.set_layout_engine()  # none any more
 
 
 def _rendered_as(figure: Figure, kind: str) -> bytes:

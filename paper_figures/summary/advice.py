@@ -47,7 +47,7 @@ def advice(model: IdentifiedModel, found: Found) -> tuple[Paragraph, ...]:
         ("Avoid", do_not),
         ("Mind", cautions(model)),
         ("Assumed", list(_assumed(found.axis, model.signals))),
-        ("To come", list(_to_come(found))),
+        ("Not yet on this page", list(_to_come(found))),
     )
     return tuple((head, " ".join(sentences)) for head, sentences in parts if sentences)
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+from contextlib import suppress
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -30,6 +33,18 @@ BREAKING_OUT = "# </script><!-- \u00e9 \u2028 & \r\n"
 def invoke(command: click.Group, *arguments: object) -> Result:
     """What a command answers."""
     return CliRunner().invoke(command, [str(argument) for argument in arguments])
+
+
+def copied_build(folders: pytest.TempPathFactory) -> Path:
+    """A folder with its own copy of what the first worker that needed it has built."""
+    base = folders.getbasetemp()
+    shared = (base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base) / "report_build"
+    if not shared.exists():
+        own = folders.mktemp("built") / "build"
+        make_build(own)
+        with suppress(OSError):  # another worker was first
+            own.rename(shared)
+    return shutil.copytree(shared, folders.mktemp("report") / "build")
 
 
 def make_build(build: Path) -> None:

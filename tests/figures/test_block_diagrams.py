@@ -7,7 +7,6 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from paper_figures.look import style
 from paper_figures.thesis.figure_registry import figure_module
 
 SIGNALS = {
@@ -119,23 +118,6 @@ def test_every_text_and_line_lies_on_the_page(diagram, extents):
 @each_diagram
 def test_text_is_of_print_size(diagram):
     assert {text.get_fontsize() for text in texts(diagram)} <= {8, 9}
-
-
-@each_diagram
-def test_two_drawings_are_the_same(name, as_pdf):
-    module = figure_module(name)
-    assert as_pdf(module.draw({})) == as_pdf(module.draw({}))
-
-
-def test_two_runs_write_the_same_bytes_in_every_format(tmp_path):
-    module = figure_module("fig_2_07")
-    runs = []
-    for folder in (tmp_path / "one", tmp_path / "two"):
-        folder.mkdir()
-        style.write(style.rendered(module.draw({}), folder, "fig_2_07", module.caption({})))
-        runs.append({path.name: path.read_bytes() for path in folder.iterdir()})
-    assert set(runs[0]) == {f"fig_2_07.{kind}" for kind in ("pdf", "svg", "png", "txt")}
-    assert runs[0] == runs[1]
 
 
 @each_diagram

@@ -840,11 +840,15 @@ def test_lowest_panels_name_the_time(name):
         assert panel.get_xlabel() or panel.get_position().y0 > bottom
 
 
-@each_figure
-def test_two_drawings_are_the_same(name, as_pdf):
-    """What a format may add, such as a date, tests/figures/test_block_diagrams.py looks for in all of them."""
-    module = figure_module(name)
-    assert as_pdf(module.draw(tables_of(name))) == as_pdf(module.draw(tables_of(name)))
+def test_two_drawings_are_written_as_the_same_bytes_in_every_format(tmp_path):
+    """With marks, clipped lines, a key; that each figure draws the same, tests/snapshots/test_figure_data.py holds."""
+    module, tables, runs = figure_module("fig_2_09"), additive_error_tables(), []
+    for folder in (tmp_path / "one", tmp_path / "two"):
+        folder.mkdir()
+        style.write(style.rendered(module.draw(tables), folder, "fig_2_09", module.caption(tables)))
+        runs.append({path.name: path.read_bytes() for path in folder.iterdir()})
+    assert set(runs[0]) == {f"fig_2_09.{kind}" for kind in ("pdf", "svg", "png", "txt")}
+    assert runs[0] == runs[1]
 
 
 @pytest.mark.parametrize("count", [10, 3000, 3001, 50000])

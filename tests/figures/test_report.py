@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from report_build import BREAKING_OUT, FIGURES, REFUSAL, ROOT, SWEEPS, Page, make_build, report
+from report_build import BREAKING_OUT, FIGURES, REFUSAL, ROOT, SWEEPS, Page, copied_build, report
 
 from data.thesis import model_named
 from design.design_file import read_design
@@ -28,9 +28,7 @@ from paper_figures.thesis.report.ledger import chapter_of
 
 @pytest.fixture(scope="module")
 def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    build = tmp_path_factory.mktemp("report") / "build"
-    make_build(build)
-    return build
+    return copied_build(tmp_path_factory)
 
 
 @pytest.fixture(scope="module")

@@ -186,7 +186,7 @@ def test_numbers_and_sentences_of_a_full_page():
     words = " ".join(page_of(plant_of(1), 2, synthetic=True)[0].text().split())
     assert [part for part in FULL_PAGE.strip().splitlines() if part not in words] == []
     assert words.count("Refused") == 1
-    assert "To come" not in words
+    assert "Not yet on this page" not in words
 
 
 def advised(found: Found) -> dict[str, str]:
@@ -335,12 +335,12 @@ def test_a_delay_free_design_is_judged_with_the_dead_time(delay_free_design, imp
 
 def test_the_page_says_what_is_still_to_come():
     alone = advised(Found())
-    assert set(alone) == {"To come"}
-    assert alone["To come"] == "This is the fit alone; designs and runs follow."
-    assert advised(Found(AXIS))["To come"] == "Designs and runs follow."
+    assert set(alone) == {"Not yet on this page"}
+    assert alone["Not yet on this page"] == "This is the fit alone; designs and runs follow."
+    assert advised(Found(AXIS))["Not yet on this page"] == "Designs and runs follow."
     part = {name: table for name, table in tables().items() if name not in ("rates", "campaign")}
     said = advised(Found(AXIS, dict.fromkeys(("design", "design_delay_free"), design_of("extended")), part))
-    assert said["To come"] == "the runs on a computer; the plants within W_a."
+    assert said["Not yet on this page"] == "the runs on a computer; the plants within W_a."
 
 
 def test_refusals_stand_at_the_end_each_with_what_it_is():

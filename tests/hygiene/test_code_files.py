@@ -35,7 +35,7 @@ COMMANDS = {words(command): command for command in STEPS}
 
 # Each command in a process of its own: it is run, or what it imports is imported; what of ours is opened is printed.
 OPENED = """
-import ast, importlib, inspect, json, os, sys, textwrap
+import ast, gc, importlib, inspect, json, os, sys, textwrap
 import click, flint, jinja2, matplotlib.backends.backend_agg, matplotlib.figure, numba, pandas, schemdraw, tqdm
 import scipy.optimize, scipy.signal, scipy.stats
 
@@ -53,6 +53,8 @@ RUNS = {
 opened = set()
 sys.addaudithook(lambda event, arguments: event == "open" and opened.add(str(arguments[0])))
 sys.path.insert(0, root)
+gc.disable()
+gc.freeze()
 for command in commands:
     if os.fork():
         continue

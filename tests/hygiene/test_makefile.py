@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -18,11 +16,10 @@ from antiwindup.from_make import arguments, words
 from identification.base.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
-# Written where make is run: the last of its arguments, and what make handed over.
-PYTHON = f"""#!{sys.executable}
-import json, os, sys
-handed = {{name[11:]: os.fsencode(value).hex() for name, value in os.environ.items() if name.startswith("ANTIWINDUP_")}}
-json.dump([sys.argv[1:], handed], open("seen.json", "w"))
+# Written where make is run: the arguments of the last, and what make handed over.
+PYTHON = """#!/bin/sh
+printf '%s\\0' "$@" > arguments
+env -0 > handed
 """
 NAMES = [
     *("sweep (1).csv", "Tom's.csv", 'a "quoted" name.csv', "a&b.csv", "a:b.csv", "a;touch pwned;.csv", "-dash.csv"),
@@ -59,8 +56,9 @@ def run(folder: Path, *arguments: str, **environment: str) -> subprocess.Complet
 
 
 def seen(folder: Path) -> tuple[list[str], dict[str, str]]:
-    argv, handed = json.loads((folder / "seen.json").read_text(encoding="utf-8"))
-    return argv, {name: os.fsdecode(bytes.fromhex(value)) for name, value in handed.items()}
+    argv, handed = (os.fsdecode((folder / name).read_bytes()).split("\0")[:-1] for name in ("arguments", "handed"))
+    variables = dict(line.split("=", 1) for line in handed)
+    return argv, {name[11:]: value for name, value in variables.items() if name.startswith("ANTIWINDUP_")}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -84,7 +82,7 @@ def test_every_value_arrives_as_it_is(make: Path, name: str) -> None:
         argv, handed = seen(make)
         assert argv == ["-m", "antiwindup.from_make", "refit"]
         assert {handed[key] for key in given if key != "OUT"} == {handed["OUTPUT"]} == {name}
-        assert {path.name for path in make.iterdir()} == before | {"seen.json"}
+        assert {path.name for path in make.iterdir()} == before | {"arguments", "handed"}
     assert run(make, "figures", f"BUILD={name}").returncode == 0
     assert seen(make)[1]["OUTPUT"] == name
     for target, variable in (("study", "SETS"), ("referee", "CASES")):

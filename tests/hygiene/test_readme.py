@@ -1,4 +1,4 @@
-"""The README: short, its examples run on the shipped synthetic tests, and its picture is of the numbers that it gives."""
+"""The README is short, its examples run on the shipped synthetic tests, and its picture has the numbers it gives."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design, read_design
 from experiments.__main__ import main
 from experiments.campaign.distributions import campaign_tables
-from experiments.thesis.studies import hidden_modes
+from experiments.thesis.studies import hidden_modes, trade_off
 from experiments.thesis.studies.additive_error import additive_error_tables
 from experiments.thesis.studies.chapter_2 import delay_free_tables
 from experiments.thesis.studies.chapter_4 import extended_tables
@@ -127,13 +127,20 @@ def tables(extended_design: Design, stored_design: Design, campaign: Path) -> di
         | f_gamma_tables(implied.additive_bound)
         | delay_free_tables(stored_design)
         | extended_tables(extended_design)
-        | trade_off_tables(extended_design)
+        | short_trade_off(extended_design)
         | interpolation_tables(extended_design)
         | sampled_rates_tables(extended_design)
         | short_hidden_modes(extended_design)
         | campaign_tables(campaign)
         | robustness_tables({"design_extended": extended_design, "design_robust": robust})
     )
+
+
+def short_trade_off(design: Design) -> dict[str, pd.DataFrame]:
+    """That of Fig. A.1 for the first, the middle and the last of its recovery times."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(trade_off, "RECOVERIES", 3)
+        return trade_off_tables(design)
 
 
 def short_hidden_modes(design: Design) -> dict[str, pd.DataFrame]:

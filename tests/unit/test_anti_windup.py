@@ -117,7 +117,7 @@ def test_optimal_gamma_beats_brute_force(implied: IdentifiedModel, beta: float) 
     gamma, cost = optimal_gamma(bound, 0.05, beta)
     omega = np.concatenate([np.geomspace(1, 1e5, 4000), np.linspace(270, 290, 8001)])
     W_a = bound_block(bound)(1j * omega)
-    for other in np.linspace(0.2 * gamma, 2 * gamma, 41):
+    for other in np.linspace(0.2 * gamma, 2 * gamma, 21):
         theta = second_order(0.05, beta, other).theta1_tilde(1j * omega)
         assert np.abs(W_a * (1 + theta)).max() >= cost * (1 - 1e-6)
 
@@ -146,7 +146,7 @@ def test_the_least_f_of_the_printed_form_is_a_matter_of_bandwidth(implied: Ident
     assert alpha == pytest.approx(beta, rel=1e-3)
     assert f < 0.85 * uncertainty_cost(bound, second_order(*thesis_choice(bound)).one_plus)[0]
     rng = np.random.default_rng(1)
-    for _ in range(200):  # no neighbour and no random set within the bandwidth is better
+    for _ in range(60):  # no neighbour and no random set within the bandwidth is better
         near = np.array([alpha, beta, gamma]) * np.exp(0.1 * rng.standard_normal(3))
         far = (*np.exp(rng.uniform(np.log(1 / 960), 1.0, 2)), np.exp(rng.uniform(-3, 6)) - 1)
         for numbers in (near, far):
@@ -196,7 +196,7 @@ def test_no_neighbour_of_the_corrected_one_that_meets_the_sector_is_better(
     one_plus = best.anti_windup.one_plus
     n = np.real(np.poly([zero for zero in one_plus.zeros if zero != 0]))
     tried = 0
-    for _ in range(100):
+    for _ in range(40):
         moved = n * np.append(1.0, np.exp(10 ** rng.uniform(-4, -1) * rng.standard_normal(2)))
         other = Block(1.0, (0j, *(complex(root) for root in np.roots(moved))), one_plus.poles)
         if popov_sector(from_one_plus(other).theta1_tilde)[0] >= 0.95:
@@ -207,10 +207,10 @@ def test_no_neighbour_of_the_corrected_one_that_meets_the_sector_is_better(
 
 def test_the_trade_off_is_monotonic(implied: IdentifiedModel) -> None:
     bound = implied.additive_bound
-    sectors = [corrected((0j,), bound, 1.0, Sector(k), 960.0).f for k in (0.8, 0.93, 0.97, 0.99, 0.999)]
+    sectors = [corrected((0j,), bound, 1.0, Sector(k), 960.0).f for k in (0.8, 0.95, 0.999)]
     assert all(np.diff(sectors) > -1e-4 * np.array(sectors[1:]))
     assert sectors[-1] > 2 * sectors[0]
-    widths = [corrected((0j,), bound, 1.0, Sector(0.95), B).f for B in (100.0, 200.0, 400.0)]
+    widths = [corrected((0j,), bound, 1.0, Sector(0.95), B).f for B in (100.0, 300.0)]
     assert all(np.diff(widths) < 0)
 
 

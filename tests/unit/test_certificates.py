@@ -98,7 +98,7 @@ def exact_area(rates: list[mp.mpc], coefficients: list[mp.mpc], cell_s: mp.mpf, 
     return mp.fsum(abs(b - a) for a, b in pairwise(at))
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("periodic", [True, False])
 @pytest.mark.parametrize("coarse", [False, True])
 def test_what_weights_prove_is_less_than_forty_digits_say(seed: int, periodic: bool, coarse: bool) -> None:
@@ -199,7 +199,7 @@ def test_states_and_costates_are_adjoint_and_defects_are_roundings(integrators: 
     assert (bound < 1e6 * scale).all()
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("coarse", [False, True])
 def test_what_a_control_reaches_is_more_than_forty_digits_say(seed: int, coarse: bool) -> None:
     """y by residues at points within the cells, from rest; the reference is 0."""
@@ -243,7 +243,7 @@ def test_integral_of_the_size_of_a_chord() -> None:
 # The interval
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_closed_form_of_an_integrator_is_inside_without_any_tolerance(seed: int) -> None:
     """a (sqrt(1 - rho^2) - rho arccos(rho)), in any units."""
     rng = np.random.default_rng(seed)
@@ -271,7 +271,7 @@ OF_EVERY_KIND = [
 ]
 
 
-@pytest.mark.parametrize("seed", range(3 + len(OF_EVERY_KIND)))
+@pytest.mark.parametrize("seed", range(len(OF_EVERY_KIND) + 1))
 def test_dense_program_over_harmonics_lies_above_the_floor_and_near_it(seed: int) -> None:
     """Another formulation: u a sum of harmonics, its limits and the error asked for at many instants, then measured.
 
@@ -280,10 +280,10 @@ def test_dense_program_over_harmonics_lies_above_the_floor_and_near_it(seed: int
     """
     rng = np.random.default_rng(seed)
     omega = 2.0
-    plant = random_plant(rng, integrators=seed % 3, omega=30.0) if seed < 3 else OF_EVERY_KIND[seed - 3]
+    plant = OF_EVERY_KIND[seed - 1] if seed else random_plant(rng, omega=30.0)
     reference = Reference((1.0, 0.4, 0.2), (omega, 2 * omega, 5 * omega), tuple(rng.uniform(-3, 3, 3)), 0.0)
     high = 0.85 * reference.required(plant).value
-    low = -high if seed < 3 else -0.7 * high
+    low = -0.7 * high if seed else -high
     found = periodic_limit(plant, reference, (low, high))
     time_s = np.arange(INSTANTS) * (2 * math.pi / omega / INSTANTS)
     k = np.arange(1, 51)

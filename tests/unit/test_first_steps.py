@@ -18,6 +18,7 @@ from design.blocks.block import Block
 from design.chapter_2.design_delay_free import design_delay_free
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
+from experiments.engine.brief_dead_times import present_of
 from experiments.engine.compiled_loop import compile_loop
 from experiments.engine.saturated_loop import SaturatedLoop
 from experiments.engine.simulate import simulate
@@ -171,7 +172,7 @@ def test_a_brief_dead_time_in_a_loop_that_saturates_at_once(kind: str) -> None:
     design = design_extended(dataclasses.replace(implied, plant=plant), [1.5], 4.0, [(2.0, 1.0)])
     anti_windup = None if kind == "none" else design.compensator(kind)
     loop = design_loop(design, REFERENCES["cosine"], anti_windup)
-    assert compile_loop(loop).brief.all()
+    assert compile_loop(loop).brief.size
     time_s = np.linspace(0.0, 0.012, 25)
     limit = float(np.abs(simulate(loop, FREE, time_s).control).max()) / 2
     control, outputs, events_s, _ = collocated_run(loop, (-limit, limit), time_s)
@@ -182,3 +183,25 @@ def test_a_brief_dead_time_in_a_loop_that_saturates_at_once(kind: str) -> None:
     np.testing.assert_allclose(
         run.outputs["output"], outputs["output"], rtol=0, atol=1e-11 * np.abs(outputs["output"]).max()
     )
+
+
+@pytest.mark.parametrize("delays", [(3e-4, 8.1e-3), (1.5e-3, 4e-4)], ids=["one", "two"])
+def test_brief_dead_times_beside_others(delays: tuple[float, float]) -> None:
+    implied = model_named("implied")
+    own, true = (dataclasses.replace(implied.plant, delay_s=h) for h in delays)
+    design = design_extended(dataclasses.replace(implied, plant=own), [1.5], 4.0, [(2.0, 1.0)])
+    loop = design_loop(design, REFERENCES["cosine"], design.compensator("corrected"), true)
+    assert compile_loop(loop).brief.tolist() == sorted(h for h in delays if h < 2e-3)
+    time_s = np.linspace(0.0, 0.05, 51)
+    control, outputs, events_s, _ = collocated_run(loop, (-10.6, 10.6), time_s)
+    run = simulate(loop, (-10.6, 10.6), time_s)
+    assert len(events_s) > 0
+    np.testing.assert_allclose(run.events_s, events_s, rtol=0, atol=1e-13)
+    for found, wanted in [(run.control, control), (run.outputs["output"], outputs["output"])]:
+        np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+
+
+def test_a_brief_dead_time_whose_iteration_leaves_all_bounds_sets_the_step() -> None:
+    """x' = w, u = 0, w(t) = 1e12 x(t - h): the growth in h has no slow mode that the iteration finds."""
+    rows, delays = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [1e12, 0.0, 0.0]]), np.array([1e-3])
+    assert present_of(rows, 1, delays, delays > 0) is None

@@ -123,8 +123,7 @@ def test_powers_of_two_as_units_change_no_bit(seed: int, time: float, gain: floa
 @pytest.mark.parametrize(
     ("seed", "time", "gain"),
     [
-        *((0, 1e-9, 1.0), (1, 1e9, 1.0), (2, 1.0, 1e-15), (3, 1.0, 1e15)),
-        *((0, 1e9, 1e-15), (1, 1e-9, 1e15), (2, 1e6, 3.0), (3, 1e-9, 1.0)),
+        *((0, 1e9, 1e-15), (1, 1e-9, 1e15), (2, 1.0, 1e-15), (3, 1e6, 3.0)),
     ],
 )
 def test_the_design_is_the_same_in_any_units(seed: int, time: float, gain: float) -> None:

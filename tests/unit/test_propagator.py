@@ -69,7 +69,7 @@ def test_a_cut_step_is_the_tabulated_one_of_its_length(reach: float) -> None:
     V, x = np.zeros((41, n + 1 + k)), np.zeros(n)
     V[0, :n], V[0, n] = x0, m
     V[:3, n + 1 :] = w
-    advance(rows, influence, V, n, 2, 40, np.ones(n), STEP, reach, x)
+    advance(rows, 0, influence, V, n, 2, 40, np.ones(n), STEP, reach, x)
     np.testing.assert_allclose(x, x0 + shorter @ z_of(x0, m, scaled, shorter.shape[1]), rtol=0, atol=1e-12)
 
 

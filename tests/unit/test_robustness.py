@@ -25,7 +25,7 @@ from identification.model.plant import PlantModel
 
 ONE, NONE = Block(1.0), Block(0.0)
 BOUND = AdditiveBound.printed_form(0.01, 20.0, 280.0, 0.05)
-some = settings(max_examples=8, deadline=None, derandomize=True)
+some = settings(max_examples=5, deadline=None, derandomize=True)
 
 
 def integrator(gain: float, delay_s: float) -> DelayLoop:
@@ -108,8 +108,9 @@ def check_against_a_grid(loop: DelayLoop, bound: AdditiveBound, margins: Margins
 # closed forms
 
 
-@pytest.mark.parametrize("delay", [1e-5, 0.1, 40.0])
-@pytest.mark.parametrize("turn", [1e-2, 0.3, 1.2, 1.5])
+@pytest.mark.parametrize(
+    ("delay", "turn"), [(1e-5, 1e-2), (1e-5, 1.5), (0.1, 0.3), (0.1, 1.2), (40.0, 1e-2), (40.0, 1.5)]
+)
 def test_integrator_with_dead_time(delay: float, turn: float) -> None:
     gain = turn / delay
     loop = integrator(gain, delay)
@@ -121,7 +122,7 @@ def test_integrator_with_dead_time(delay: float, turn: float) -> None:
     assert margins.phase_deg.omega == pytest.approx(gain, rel=1e-12)
     assert margins.delay_greatest_s.value == pytest.approx(np.pi / 2 / gain, rel=1e-12)
     assert margins.delay_least_s == (0.0, None)
-    omega = np.linspace(1e-3, 12, 200_001) / delay
+    omega = np.linspace(1e-3, 12, 20_001) / delay
     assert margins.modulus.value == pytest.approx(np.min(np.abs(1 + gain / (1j * omega) * np.exp(-1j * omega * delay))))
     check_against_roots(loop, margins)
 
@@ -224,7 +225,7 @@ def test_extended_design_has_no_guarantee(extended_design: Design, implied: Iden
     assert not margins.is_guaranteed
     assert margins.hidden == (0.0,)
     check_against_roots(loop, margins)
-    omega = np.concatenate([np.geomspace(1e-3, 1e4, 200_001), np.linspace(174, 176, 20_001)])
+    omega = np.concatenate([np.geomspace(1e-3, 1e4, 50_001), np.linspace(174, 176, 20_001)])
     check_against_a_grid(loop, implied.additive_bound, margins, omega)
 
 
@@ -237,7 +238,7 @@ def test_delay_free_design_on_the_plant_with_dead_time(
     margins = margins_of(loop, implied.additive_bound)
     assert margins.hidden == (0.0,)
     check_against_roots(loop, margins)
-    omega = np.concatenate([np.geomspace(1e-3, 1e4, 400_001), *(np.linspace(w - 1, w + 1, 20_001) for w in (282, 958))])
+    omega = np.concatenate([np.geomspace(1e-3, 1e4, 50_001), *(np.linspace(w - 1, w + 1, 10_001) for w in (282, 958))])
     check_against_a_grid(
         loop, implied.additive_bound, margins, omega[np.abs(omega - delay_free_design_omega(loop)) > 0]
     )

@@ -62,7 +62,7 @@ def judged(
 def densely(design: Design, limits: tuple[float, float], reference: Reference, until_s: float) -> tuple[float, float]:
     """The largest secant and the largest |u| of a plain run, from u, 1/P and the limits, sample by sample."""
     loop = design_loop(design, reference, design.compensator("corrected"))
-    time_s = np.linspace(0.0, until_s, 400001)
+    time_s = np.linspace(0.0, until_s, 100001)
     control = simulate(dataclasses.replace(loop, outputs={}), limits, time_s).control
     steady = np.zeros(len(time_s))
     for amplitude, omega, phase in zip(reference.amplitudes, reference.omegas, reference.phases_rad, strict=True):
@@ -151,7 +151,7 @@ def test_v_settles_at_the_steady_control(name: str, slope: float, request: pytes
     design: Design = request.getfixturevalue(name)
     usual = thesis_reference(design.kind, design.reference_omegas)
     reference = dataclasses.replace(usual, offset=3.0, slope=slope)
-    time_s = np.linspace(0.0, 400.0, 40001)
+    time_s = np.linspace(0.0, 400.0, 4001)
     run = simulate(design_loop(design, reference, None), (-np.inf, np.inf), time_s)
     late = time_s > 390
     steady = steady_control(reference, design.loop_plant, time_s)[late]
@@ -174,15 +174,13 @@ def norm(signal: np.ndarray, time_s: np.ndarray) -> float:
     return float(np.sqrt(np.trapezoid(signal**2, time_s)))
 
 
-@pytest.mark.parametrize(
-    ("phase", "limit"), [(0.0, 11.0), (0.7, 30.0), (0.7, 60.0), (np.pi / 2, 30.0), (np.pi / 2, 45.0), (np.pi / 2, 90.0)]
-)
+@pytest.mark.parametrize(("phase", "limit"), [(0.0, 11.0), (0.7, 30.0), (0.7, 60.0), (np.pi / 2, 45.0)])
 def test_the_promise_is_kept(extended_design: Design, phase: float, limit: float) -> None:
     """||u_tilde|| <= ||v - v_s||/(1/k - 1/k_c), of the run and of its beginnings."""
     reference, kind = sinusoid(50.0, 1.5, phase, 0.0), extended_design.compensator("corrected")
     found = judged(extended_design, (-limit, limit), reference, 8.0)
     assert found.covered
-    time_s = np.linspace(0.0, 8.0, 400001)
+    time_s = np.linspace(0.0, 8.0, 100001)
     run = simulate(design_loop(extended_design, reference, kind), (-limit, limit), time_s)
     transient = run.outputs["v"] - steady_control(reference, extended_design.plant, time_s)
     beyond = run.control - run.saturated_control
@@ -248,7 +246,7 @@ def test_a_plant_with_another_number_of_unstable_poles_is_not_within(
 @pytest.mark.parametrize("beta", [0.01, 0.025, 0.3])
 def test_the_circle_criterion_by_brute_force(gamma: float, beta: float) -> None:
     theta = second_order(0.05, beta, gamma).theta1_tilde
-    omega = np.append(0.0, np.geomspace(1e-4, 1e6, 400001))
+    omega = np.append(0.0, np.geomspace(1e-4, 1e6, 50001))
     least = (gamma / ((1 + 0.05j * omega) * (1 + 1j * beta * omega))).real.min()
     found = circle_sector(theta)
     assert found == pytest.approx(-1 / least, rel=1e-6)

@@ -38,9 +38,9 @@ def values(intervals: tuple[Interval, ...]) -> list[float]:
 
 
 def unstable_roots(loop: DelayLoop, factor: complex = 1.0, delay_s: float | None = None) -> int:
-    """Roots right of the axis by a winding number on a fixed mesh, of both signs of omega, none of the tool's code.
+    """Roots right of the axis by a winding number in steps of 1 rad at most, none of the tool's code.
 
-    The function is divided by a polynomial of its degree with all roots at -c.
+    Along both signs of omega. The function is divided by a polynomial of its degree with all roots at -c.
     """
     h = loop.plant.delay_s if delay_s is None else delay_s
     P, K, T = loop.plant.without_delay(), loop.forward, loop.feedback
@@ -60,16 +60,26 @@ def unstable_roots(loop: DelayLoop, factor: complex = 1.0, delay_s: float | None
             value = value * (s - left[k] if k < len(left) else 1) * (s - roots[k] if k < len(roots) else 1) / (s + c)
         return value
 
+    def along(omega: np.ndarray) -> np.ndarray:
+        s = 1j * omega
+        f = over(s, [], []) - T.gain * over(s, list(T.zeros), list(T.poles)) * np.exp(-loop.delay_s * s)
+        return np.asarray(f + factor * (P * K).gain * over(s, zeros, poles) * np.exp(-h * s))
+
     resonances = np.array([abs(root.imag) for root in (*zeros, *denominator)])
-    fine = [at + abs(1e-3 * at + 1e-3) * np.linspace(-5, 5, 2001) for at in np.unique(resonances)]
-    step = 0.02 / max(h, loop.delay_s, 1e-3)
-    grid = np.concatenate([np.geomspace(1e-7, 1e8, 60_001) * c, np.arange(0, min(400 * c, 2e5 * step), step), *fine])
+    fine = [at + abs(1e-3 * at + 1e-3) * np.linspace(-5, 5, 101) for at in np.unique(resonances)]
+    step = 0.2 / max(h, loop.delay_s, 1e-3)
+    grid = np.concatenate([np.geomspace(1e-7, 1e8, 8001) * c, np.arange(0, min(400 * c, 2e4 * step), step), *fine])
     omega = np.unique(np.abs(grid))
-    s = 1j * np.concatenate([-omega[::-1], omega])
-    f = over(s, [], []) - T.gain * over(s, list(T.zeros), list(T.poles)) * np.exp(-loop.delay_s * s)
-    f = f + factor * (P * K).gain * over(s, zeros, poles) * np.exp(-h * s)
-    steps = np.angle(f[1:] / f[:-1])
-    assert np.abs(np.diff(f))[np.abs(f[1:]) < 1e-9].size == 0, "a root on the axis"
+    omega = np.concatenate([-omega[::-1], omega])
+    f = along(omega)
+    for _ in range(40):
+        steps = np.angle(f[1:] / f[:-1])
+        wide = np.flatnonzero(np.abs(steps) > 1)
+        if not len(wide):
+            break
+        middle = (omega[wide] + omega[wide + 1]) / 2
+        omega, f = np.insert(omega, wide + 1, middle), np.insert(f, wide + 1, along(middle))
+    assert not len(wide), "a root on the axis"
     turns = -(np.sum(steps)) / (2 * np.pi)
     assert abs(turns - round(turns)) < 1e-3
     return round(turns)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Sequence
 from itertools import pairwise, product
 from typing import Any, NamedTuple
 
@@ -14,12 +15,14 @@ from scipy.optimize import brentq
 from experiments.runs.batch import Each, threaded
 from experiments.thesis.unprinted.chapter_2_weights import delay_free_rows, delay_free_scan
 from experiments.thesis.unprinted.chapter_4_conditions import DELAYS, SETS, Conditions, Point
-from experiments.thesis.unprinted.joint_search import together
+from experiments.thesis.unprinted.joint_search import least_miss, together
 from experiments.thesis.unprinted.printed_outcomes import CONVERGED_PERCENT, OUTCOMES, READINGS, printed_outcomes
 from experiments.thesis.unprinted.where_met import Found, all_met, compared, where_met
 
 Span = tuple[Conditions, Any, Any, Any]  # with an initial output and two (limit, offset)
+Over = tuple[Conditions, float, list[float]]  # with an initial output and limits
 Line = tuple[Conditions, str, Any, Any]  # with a kind of loop, an initial output, and limit -> outcomes
+Outcomes = Callable[[tuple[Conditions, Point]], dict[str, float]]
 BESIDE = 4e-5  # of a limit: farther than Pade's approximation moves where an outcome comes
 
 
@@ -37,6 +40,18 @@ class Grid(NamedTuple):
     scan: np.ndarray
     limits: np.ndarray
     outputs: np.ndarray
+
+
+def _both(job: tuple[Conditions, Point]) -> dict[str, float]:
+    one, point = job
+    return one.both(point)
+
+
+def _both_if_near(job: tuple[Conditions, Point]) -> dict[str, float]:
+    one, point = job
+    found = one.outcomes("none", point)
+    far = least_miss(found) > 1
+    return found | (dict.fromkeys(OUTCOMES["thesis"], math.nan) if far else one.outcomes("thesis", point))
 
 
 def usual_grid() -> Grid:
@@ -74,27 +89,42 @@ def scanned(conditions: Sequence[Conditions], limits: np.ndarray, each: Each = t
         outcome of :meth:`experiments.thesis.unprinted.chapter_4_conditions.Conditions.both`, empty for never; sorted by
         these.
     """
-    return _explored(conditions, limits, np.array([0.0, 1.0]), each)
+    lines = _lines(conditions, limits, np.array([0.0, 1.0]))
+    return _explored(lines, each(_never_reached, lines), each)
 
 
 def grid_of(conditions: Sequence[Conditions], grid: Grid, each: Each = threaded) -> pd.DataFrame:
-    """Every outcome at every limit and initial output of a grid; the columns are those of :func:`scanned`."""
-    return _explored(conditions, grid.limits, grid.outputs, each)
+    """The same at each limit and initial output, with anti-windup where the loop without it misses by 100 % at most."""
+    lines = _lines(conditions, grid.limits, grid.outputs)
+    return _explored(lines, [math.inf] * len(lines), each, _both_if_near)
 
 
-def _explored(conditions: Sequence[Conditions], limits: np.ndarray, outputs: np.ndarray, each: Each) -> pd.DataFrame:
-    """The outcomes at each limit and initial output, and where between two limits the lasting offset passes zero.
-
-    The error converges to zero only there, on intervals that a grid would miss.
-    """
-    jobs = [
-        (one, Point(float(share * one.required), float(part * one.initial_reference)))
-        for one, part, share in product(conditions, outputs, limits)
+def _lines(conditions: Sequence[Conditions], limits: np.ndarray, outputs: np.ndarray) -> list[Over]:
+    """Each condition from each initial output, with the limits in the actuator's unit."""
+    return [
+        (one, float(part * one.initial_reference), [float(limit) for limit in limits * one.required])
+        for one, part in product(conditions, outputs)
     ]
-    table = _table(jobs, each(_both, jobs))
+
+
+def _explored(lines: Sequence[Over], free: Sequence[float], each: Each, work: Outcomes = _both) -> pd.DataFrame:
+    """The outcomes at the limits of each line, and where between two limits the lasting offset passes zero.
+
+    The error converges to zero only there, on intervals that a grid would miss. Wider limits than that of ``free``, of
+    each line a limit that is never reached, make the same run.
+    """
+    jobs = [(one, Point(limit, output)) for one, output, own in lines for limit in own]
+    runs = [
+        (one, Point(min(limit, least), output))
+        for (one, output, own), least in zip(lines, free, strict=True)
+        for limit in own
+    ]
+    different = list(dict.fromkeys(runs))
+    outcomes = dict(zip(different, each(work, different), strict=True))
+    table = _table(jobs, [outcomes[run] for run in runs])
     spans: list[Span] = [
         (one, output, low, high)
-        for one in conditions
+        for one in dict.fromkeys(one for one, _, _ in lines)
         for output, rows in _of(table, one).groupby("initial_output")
         for low, high in pairwise(rows[["limit", "final_offset_percent"]].itertuples(index=False, name=None))
         if low[1] * high[1] < 0 and max(abs(low[1]), abs(high[1])) > CONVERGED_PERCENT
@@ -105,9 +135,18 @@ def _explored(conditions: Sequence[Conditions], limits: np.ndarray, outputs: np.
     )
 
 
-def _both(job: tuple[Conditions, Point]) -> dict[str, float]:
-    one, point = job
-    return one.both(point)
+def _never_reached(line: Over) -> float:
+    """The least of some limits that the control from an initial output never reaches, infinite where it reaches all.
+
+    Any wider limit makes the same run, with anti-windup or without.
+    """
+    one, output, limits = line
+
+    def is_free(limit: float) -> bool:
+        return one.outcomes("none", Point(limit, output))["desaturation_s"] == 0
+
+    ordered = sorted(limits)
+    return ordered[bisect_left(ordered, True, key=is_free)] if is_free(ordered[-1]) else math.inf
 
 
 def _converging(span: Span) -> tuple[Conditions, Point]:

@@ -26,7 +26,8 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     plants = int(only(summary, "plants"))
     return (
         "What the anti-windup does over the plants that W_a admits (not in the thesis). SYNTHETIC: "
-        f"{plants} plants that we drew (seed {int(only(summary, 'seed'))}), each in the loop of the same design, under "
+        f"{plants} plant{'s' if plants > 1 else ''} that we drew (seed {int(only(summary, 'seed'))}), "
+        "each in the loop of the same design, under "
         f"the limits {of_limits(summary)}, for {number(only(summary, 'horizon_s'))} s of the thesis's "
         f"reference. {_promised(summary)} How they lie within W_a is a choice of ours, so the shares are no "
         "probabilities of a real plant. "
