@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from experiments.options import DESIGN, LIMIT_PAIR, asked_limits
+from experiments.options import ANTI_WINDUP, DESIGN, LIMIT_PAIR, asked_limits
 from experiments.pair_options import PairCommand
 from identification.base.axis_option import AXIS
 from identification.base.errors import InputError
@@ -22,11 +22,7 @@ TARGETS = ("c", "matlab", "python", "json", "simulink", "fmu")
 @click.option("--rate", type=float, required=True, help="Sampling rate of the controller in Hz.")
 @click.option("--to", type=click.Choice(TARGETS), required=True, help="Format to write.")
 @LIMIT_PAIR
-@click.option(
-    "--anti-windup",
-    default="corrected",
-    help="Anti-windup to use: none, thesis, corrected, one that you added to DESIGN, or a published method.",
-)
+@ANTI_WINDUP
 @click.option(
     "--method",
     help="Discretisation method: matched, tustin or exact. Default: the one that `sampled` chooses.",

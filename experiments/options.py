@@ -54,6 +54,13 @@ reference_options = together(
 """Those, and ``--slope`` and ``--reference``."""
 
 
+ANTI_WINDUP = click.option(
+    "--anti-windup",
+    default="corrected",
+    help="none, thesis, corrected, another of DESIGN, or one of others: back-calculation, conditioning, observer, "
+    "internal-model, weston-postlethwaite or static.",
+)
+
 LIMIT_PAIR = click.option(
     "--limit",
     type=NumberPair(),

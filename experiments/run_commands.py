@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from experiments.options import DESIGN, LIMIT_PAIR, asked_limits, disturbance_options, reference_options
+from experiments.options import ANTI_WINDUP, DESIGN, LIMIT_PAIR, asked_limits, disturbance_options, reference_options
 from experiments.pair_options import PairCommand
 from experiments.tables import csv_writer
 from identification.base.axis_option import AXIS
@@ -26,11 +26,7 @@ _run_options = together(
     DESIGN,
     AXIS,
     LIMIT_PAIR,
-    click.option(
-        "--anti-windup",
-        default="corrected",
-        help="Anti-windup to use: none, thesis, corrected, one that you added to DESIGN, or a published method.",
-    ),
+    ANTI_WINDUP,
     click.option("--until", type=float, required=True, help="Length of the run in seconds."),
     reference_options,
     disturbance_options,
