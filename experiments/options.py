@@ -57,8 +57,8 @@ reference_options = together(
 ANTI_WINDUP = click.option(
     "--anti-windup",
     default="corrected",
-    help="none, thesis, corrected, another of DESIGN, or one of others: back-calculation, conditioning, observer, "
-    "internal-model, weston-postlethwaite or static.",
+    help="Anti-windup: none, thesis, corrected, one that you added to DESIGN, or a published one: back-calculation, "
+    "conditioning, observer, internal-model, weston-postlethwaite or static.",
 )
 
 LIMIT_PAIR = click.option(
