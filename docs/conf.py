@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 import warnings
@@ -11,6 +10,7 @@ from pathlib import Path
 from types import GenericAlias
 from typing import TYPE_CHECKING, Any
 
+import numba
 from jinja2 import FileSystemLoader
 from jinja2.sandbox import SandboxedEnvironment
 from latex2mathml.converter import convert
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from sphinx.writers.html5 import HTML5Translator
 
 warnings.filterwarnings("ignore", "Unknown section", module="numpydoc")  # in docstrings of others
-os.environ["NUMBA_DISABLE_JIT"] = "1"  # a compiled function would hide its docstring and its arguments
+# A compiled function would hide its docstring. Not by the environment, which the notebooks would take over.
+numba.config.DISABLE_JIT = True
 ROOT = Path(__file__).resolve().parents[1]
 API = ROOT / "docs" / "reference" / "api"
 COMMANDS = ROOT / "docs" / "reference" / "commands"
@@ -55,6 +56,7 @@ myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "attrs_inline", "c
 myst_heading_anchors = 4
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(ROOT / "build" / "docs" / "notebooks")
+nb_execution_in_temp = True
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300
 nb_merge_streams = True
@@ -74,6 +76,7 @@ docscrape_sphinx.SandboxedEnvironment = lambda loader: TEMPLATES
 html_theme = "pydata_sphinx_theme"
 html_title = "Anti-windup"
 html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_theme_options = {
     "show_toc_level": 2,
