@@ -338,18 +338,30 @@ def test_every_test_has_its_errors(tests):
     tables = additive_error_tables(tests)
     table = tables["additive_error"]
     (panel,) = figure_module("fig_2_09").draw(tables).axes
-    *errors, plant, bound = panel.lines
+    *errors, bound, ring, plant = panel.lines
     assert len(errors) == tests
     for number, line in enumerate(errors, start=1):
         rows = table[table["test"] == number]
-        np.testing.assert_array_equal(line.get_xydata(), rows[["omega", "error"]])
+        np.testing.assert_allclose(line.get_xydata(), np.column_stack([rows["omega"], 20 * np.log10(rows["error"])]))
         assert line.get_linestyle() == "None"
-    assert len({(line.get_marker(), line.get_color()) for line in errors}) == tests
-    np.testing.assert_array_equal(bound.get_ydata(), table["bound"][:60])
-    np.testing.assert_array_equal(plant.get_ydata(), table["plant"][:60])
-    assert look(bound) == look(Line2D([], [], **style.LINES["bound"]))
-    assert (panel.get_xscale(), panel.get_yscale()) == ("log", "log")
-    assert panel.get_xlabel() == r"$\omega$ [rad/s]"
+    np.testing.assert_allclose(bound.get_ydata(), 20 * np.log10(table["bound"][:60]))
+    np.testing.assert_allclose(ring.get_xydata(), [[40.0, 20 * np.log10(tests / 40)]])  # error/bound is 10 test/omega^2
+    omega, drawn = plant.get_data()
+    np.testing.assert_allclose(drawn[omega > 70], 20 * np.log10(5 / omega[omega > 70]), atol=0.05)
+    assert panel.get_xscale() == "log"
+    assert (panel.get_xlabel(), panel.get_ylabel()) == (r"$\omega$ [rad/s]", "Magnitude [dB]")
+
+
+def test_a_notch_between_two_lines_is_drawn_round():
+    """|P| of one undamped zero at 500.4 rad/s, of which the lines beside it say how deep it is."""
+    tables, omega = additive_error_tables(1), np.arange(100.0, 900.0)
+    plant = np.abs(1 - (omega / 500.4) ** 2 + 0.02j * omega / 500.4)
+    tables["additive_error"] = pd.DataFrame({"test": 1, "omega": omega, "error": 1e-3, "bound": 1.0, "plant": plant})
+    *_, line = figure_module("fig_2_09").draw(tables).axes[0].lines
+    at, drawn = line.get_data()
+    exact = 20 * np.log10(np.abs(1 - (at / 500.4) ** 2 + 0.02j * at / 500.4))
+    assert at.size > 2 * omega.size
+    assert np.abs(drawn - exact).max() < 0.01
 
 
 def test_largest_errors_survive_thinning():
@@ -362,9 +374,9 @@ def test_largest_errors_survive_thinning():
         {"test": 1, "omega": omega, "error": error, "bound": 10.0, "plant": 1.0}
     ).sample(frac=1, random_state=2)
     errors = figure_module("fig_2_09").draw(tables).axes[0].lines[0]
-    assert len(errors.get_xdata()) <= 500
+    assert len(errors.get_xdata()) <= panels.MOST_POINTS
     drawn = [tuple(point) for point in errors.get_xydata()]
-    assert {(omega[17], 7.0), (omega[4321], 1e-4)} <= set(drawn)
+    assert {(omega[17], 20 * np.log10(7.0)), (omega[4321], 20 * np.log10(1e-4))} <= set(drawn)
 
 
 @pytest.mark.parametrize("above", [0, 2])
