@@ -398,7 +398,7 @@ def test_each_beta_has_a_curve_with_its_least_value_and_the_chosen_one_leads(bet
     (panel,) = figure_module("fig_2_10").draw(tables).axes
     assert len(panel.lines) == 2 * len(betas)
     labels = [text.get_text() for text in panel.get_legend().get_texts()]
-    assert labels[0] == rf"$\beta = {captions.fraction(chosen)}$ s (chosen)"
+    assert labels[0] == rf"$\beta$ = {captions.fraction(chosen)} s (chosen)"
     assert sum("chosen" in label for label in labels) == 1
     assert look(panel.lines[0]) == look(Line2D([], [], **style.LINES["family 1"]))
     for curve, dot in zip(panel.lines[::2], panel.lines[1::2], strict=True):
