@@ -54,8 +54,7 @@ root_doc = "index"
 # pages
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "attrs_inline", "colon_fence"]
 myst_heading_anchors = 4
-nb_execution_mode = "cache"
-nb_execution_cache_path = str(ROOT / "build" / "docs" / "notebooks")
+nb_execution_mode = "force"  # the pages are of the code as it is, which no cache knows
 nb_execution_in_temp = True
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300

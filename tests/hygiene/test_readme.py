@@ -25,7 +25,7 @@ PICTURE = ROOT / "docs/images/windup.py"
 
 def example(language: str) -> list[str]:
     (block,) = re.findall(rf"^```{language}\n(.*?)^```", TEXT, flags=re.MULTILINE | re.DOTALL)
-    return list(block.splitlines())
+    return [line for line in block.splitlines() if line]
 
 
 def test_it_is_short() -> None:
