@@ -70,6 +70,11 @@ def judged(point: Point, outcomes: Mapping[str, float], converging: bool) -> Joi
     return Joint(worst if met else math.inf, point, tuple(reading for _, reading in found), outcomes)
 
 
+def least_miss(outcomes: Mapping[str, float]) -> float:
+    """What a point misses by at least, of which some outcomes have been computed."""
+    return max(miss for miss, _ in _nearest_readings(outcomes))
+
+
 def _nearest_readings(outcomes: Mapping[str, float]) -> list[tuple[float, str]]:
     """Of each outcome that has been computed: by how much its nearest reading misses, and which that is."""
     found = []
@@ -103,7 +108,7 @@ def _refined(start: Start) -> Joint:
         nonlocal best
         point = Point(*(float(np.clip(at, axis[0], axis[-1])) for at, axis in zip(x, axes, strict=True)))
         outcomes = one.outcomes("none", point)
-        least = max(miss for miss, _ in _nearest_readings(outcomes))
+        least = least_miss(outcomes)
         if least >= best.miss:  # whatever the other loop comes to, the point is no better
             return min(least, _MOST)
         joint = judged(point, outcomes | one.outcomes("thesis", point), converging)

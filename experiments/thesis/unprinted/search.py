@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise, product
 from typing import Any, NamedTuple
 
@@ -15,13 +15,14 @@ from scipy.optimize import brentq
 from experiments.runs.batch import Each, threaded
 from experiments.thesis.unprinted.chapter_2_weights import delay_free_rows, delay_free_scan
 from experiments.thesis.unprinted.chapter_4_conditions import DELAYS, SETS, Conditions, Point
-from experiments.thesis.unprinted.joint_search import together
+from experiments.thesis.unprinted.joint_search import least_miss, together
 from experiments.thesis.unprinted.printed_outcomes import CONVERGED_PERCENT, OUTCOMES, READINGS, printed_outcomes
 from experiments.thesis.unprinted.where_met import Found, all_met, compared, where_met
 
 Span = tuple[Conditions, Any, Any, Any]  # with an initial output and two (limit, offset)
 Over = tuple[Conditions, float, list[float]]  # with an initial output and limits
 Line = tuple[Conditions, str, Any, Any]  # with a kind of loop, an initial output, and limit -> outcomes
+Outcomes = Callable[[tuple[Conditions, Point]], dict[str, float]]
 BESIDE = 4e-5  # of a limit: farther than Pade's approximation moves where an outcome comes
 
 
@@ -39,6 +40,18 @@ class Grid(NamedTuple):
     scan: np.ndarray
     limits: np.ndarray
     outputs: np.ndarray
+
+
+def _both(job: tuple[Conditions, Point]) -> dict[str, float]:
+    one, point = job
+    return one.both(point)
+
+
+def _both_if_near(job: tuple[Conditions, Point]) -> dict[str, float]:
+    one, point = job
+    found = one.outcomes("none", point)
+    far = least_miss(found) > 1
+    return found | (dict.fromkeys(OUTCOMES["thesis"], math.nan) if far else one.outcomes("thesis", point))
 
 
 def usual_grid() -> Grid:
@@ -81,9 +94,9 @@ def scanned(conditions: Sequence[Conditions], limits: np.ndarray, each: Each = t
 
 
 def grid_of(conditions: Sequence[Conditions], grid: Grid, each: Each = threaded) -> pd.DataFrame:
-    """Every outcome at every limit and initial output of a grid; the columns are those of :func:`scanned`."""
+    """The same at each limit and initial output, with anti-windup where the loop without it misses by 100 % at most."""
     lines = _lines(conditions, grid.limits, grid.outputs)
-    return _explored(lines, [math.inf] * len(lines), each)
+    return _explored(lines, [math.inf] * len(lines), each, _both_if_near)
 
 
 def _lines(conditions: Sequence[Conditions], limits: np.ndarray, outputs: np.ndarray) -> list[Over]:
@@ -94,7 +107,7 @@ def _lines(conditions: Sequence[Conditions], limits: np.ndarray, outputs: np.nda
     ]
 
 
-def _explored(lines: Sequence[Over], free: Sequence[float], each: Each) -> pd.DataFrame:
+def _explored(lines: Sequence[Over], free: Sequence[float], each: Each, work: Outcomes = _both) -> pd.DataFrame:
     """The outcomes at the limits of each line, and where between two limits the lasting offset passes zero.
 
     The error converges to zero only there, on intervals that a grid would miss. Wider limits than that of ``free``, of
@@ -107,7 +120,7 @@ def _explored(lines: Sequence[Over], free: Sequence[float], each: Each) -> pd.Da
         for limit in own
     ]
     different = list(dict.fromkeys(runs))
-    outcomes = dict(zip(different, each(_both, different), strict=True))
+    outcomes = dict(zip(different, each(work, different), strict=True))
     table = _table(jobs, [outcomes[run] for run in runs])
     spans: list[Span] = [
         (one, output, low, high)
@@ -134,11 +147,6 @@ def _never_reached(line: Over) -> float:
 
     ordered = sorted(limits)
     return ordered[bisect_left(ordered, True, key=is_free)] if is_free(ordered[-1]) else math.inf
-
-
-def _both(job: tuple[Conditions, Point]) -> dict[str, float]:
-    one, point = job
-    return one.both(point)
 
 
 def _converging(span: Span) -> tuple[Conditions, Point]:
