@@ -23,7 +23,9 @@ from experiments.thesis.studies.chapter_4 import PADE_ORDER
 from experiments.thesis.studies.desaturation import PERIODS
 from experiments.thesis.unprinted.chapter_4_conditions import SAMPLES_PER_PERIOD, held_state, with_pade_at_rest
 from experiments.thesis.unprinted.printed_outcomes import (
+    COUNTED_FROM_THE_END,
     OUTCOMES,
+    READINGS,
     after_saturation,
     with_anti_windup,
     without_anti_windup,
@@ -83,12 +85,20 @@ class Case:
         Makes the blocks.
     delay
         "exact", or "pade" as of :class:`experiments.thesis.unprinted.chapter_4_conditions.Conditions`.
+    from_the_end
+        Whether the 4.46 s are counted from the last saturation on, and not from t = 0.
     """
 
     name: str
     added: tuple[str, ...] = ()
     loops: Callable[[], Loops] = usual
     delay: str = "exact"
+    from_the_end: bool = False
+
+    @property
+    def readings(self) -> Mapping[str, tuple[str, ...]]:
+        """Of each outcome."""
+        return COUNTED_FROM_THE_END if self.from_the_end else READINGS
 
     @cached_property
     def reference(self) -> Reference:
@@ -212,5 +222,6 @@ CASES = (
     Case("as printed, Pade", loops=as_printed, delay="pade"),
     Case("theta2 without 1/s", loops=without_integrator),
     Case("theta1~(0) = -1", loops=cancelling),
+    Case("4.46 s after saturation", from_the_end=True),
 )
 """What is searched; "equal limits" is the condition of the usual search."""
