@@ -146,7 +146,7 @@ class Case:
         period, upper = self.reference.period_s, values["upper"]
         time_s = np.linspace(0.0, PERIODS * period, PERIODS * samples + 1)
         try:
-            run = simulate(self._started(kind, values), (-values.get("lower", upper), upper), time_s)
+            run = simulate(self.started(kind, values), (-values.get("lower", upper), upper), time_s)
         except DivergenceError:
             found = dict.fromkeys(OUTCOMES[kind], math.nan)
         else:
@@ -154,7 +154,8 @@ class Case:
             found = (with_it if kind == "thesis" else without_anti_windup)(run, span_s=period)
         return after_saturation(found) if kind == "thesis" else found
 
-    def _started(self, kind: str, values: Mapping[str, float]) -> ReadyLoop:
+    def started(self, kind: str, values: Mapping[str, float]) -> ReadyLoop:
+        """A loop of :attr:`moved` under the initial conditions and the disturbance of ``values``."""
         rest, by = self.moved[kind]
         started = rest.starting_from(rest.loop.x0 + sum(values[name] * move for name, move in by.items()))
         if "disturbance" not in values:
