@@ -69,7 +69,7 @@ def tracking_tables(name: str) -> Tables:
     for k, run in enumerate(("none", "thesis", "corrected", "none_pade", "thesis_pade")):
         columns[f"error_{run}"] = (5.0 - k) * np.exp(-TIME_S) + (2.5 if run.startswith("thesis") else 0.0)
         columns[f"output_{run}"] = columns["reference"] - columns[f"error_{run}"]
-        columns[f"control_{run}"] = (12.0 + 10 * k) * np.exp(-TIME_S) * np.cos(9 * TIME_S)
+        columns[f"control_{run}"] = (12.0 + 10 * k) * np.exp(-TIME_S / 2) * np.cos(9 * TIME_S)
         columns[f"saturated_{run}"] = np.clip(columns[f"control_{run}"], -6.5, 6.5)
         rows.append(
             {
@@ -210,14 +210,14 @@ PANELS = {
         *(REFERENCE | signals("output", "thesis"), signals("error", "thesis")),
         *(REFERENCE | signals("output", "corrected"), signals("error", "corrected"), {}),
     ],
-    "fig_4_04": [
-        signals(signal, run) for run in ("thesis", "corrected") for signal in ("control", "saturated", "control")
-    ],
+    "fig_4_04": [signals("control", run) for run in ("thesis", "corrected") for _ in range(3)],
 }
 NAMES = [*PANELS, "fig_2_09", "fig_2_10", "fig_2_11", "fig_a_04", "fig_a_05", "fig_a_06", "fig_a_09"]
 CONTROL_PANELS = [
-    *(("fig_2_02", 1, "swapped_none"), ("fig_2_03", 3, "printed_back_calculation")),
-    *(("fig_2_13", 0, "thesis"), ("fig_2_13", 1, "corrected"), ("fig_4_04", 2, "thesis"), ("fig_4_04", 5, "corrected")),
+    *(("fig_2_02", 1, "swapped_none"), ("fig_2_02", 3, "printed_none")),
+    *(("fig_2_03", 1, "swapped_back_calculation"), ("fig_2_03", 3, "printed_back_calculation")),
+    *(("fig_2_13", 0, "thesis"), ("fig_2_13", 1, "corrected")),
+    *(("fig_4_04", letter, run) for run, letters in (("thesis", (1, 2)), ("corrected", (4, 5))) for letter in letters),
 ]
 
 each_figure = pytest.mark.parametrize("name", NAMES)
@@ -240,6 +240,11 @@ def lettered(figure: Figure) -> list[Axes]:
 
 def look(line: Line2D) -> tuple[object, ...]:
     return line.get_color(), line.get_linewidth(), line.is_dashed()
+
+
+def shown(name: str, letter: int, table: pd.DataFrame) -> pd.DataFrame:
+    """The rows that a panel shows."""
+    return table[table["time_s"] <= lettered(drawn_once(name))[letter].get_xlim()[1]]
 
 
 def lines_of(panel: Axes, values: pd.Series) -> list[Line2D]:
@@ -267,19 +272,25 @@ def texts(figure: Figure) -> list[Text]:
 
 @pytest.mark.parametrize(("name", "letter"), [(name, k) for name, panels in PANELS.items() for k in range(len(panels))])
 def test_panel_shows_its_signals_in_the_named_styles(name, letter):
-    table = tables_of(name)[figure_module(name).TABLES[0]]
+    table = shown(name, letter, tables_of(name)[figure_module(name).TABLES[0]])
     panel = lettered(drawn_once(name))[letter]
+    upon_band = {"linewidth": 0.9} if (name, letter) in [panel[:2] for panel in CONTROL_PANELS] else {}
     for column, kind in PANELS[name][letter].items():
-        assert [look(line) for line in lines_of(panel, table[column])] == [look(Line2D([], [], **style.LINES[kind]))]
+        expected = look(Line2D([], [], **style.LINES[kind] | upon_band))
+        assert [look(line) for line in lines_of(panel, table[column])] == [expected]
     for line in panel.lines[: len(PANELS[name][letter])]:
         np.testing.assert_array_equal(line.get_xdata(), table["time_s"])
 
 
 @pytest.mark.parametrize("name", PANELS)
 def test_panels_show_the_whole_run_but_for_the_enlarged_ones(name):
-    enlarged = {"fig_4_03": {4: 1.15 * 4.125}, "fig_4_04": {2: 1.15 * 5.125, 5: 1.15 * 5.125}}.get(name, {})
+    """The controls swing at 9 rad/s, so that six cycles take 4.2 s; the differences decay as exp(-t)."""
+    start, cycles, decay = 1.15 * 5.125, 6 * 2 * np.pi / 9, np.log(10)
+    enlarged = {"fig_4_01": {2: decay}, "fig_4_03": {4: decay}}
+    enlarged["fig_4_04"] = {1: start, 2: cycles, 4: start, 5: cycles}
     for k, panel in enumerate(lettered(drawn_once(name))):
-        assert panel.get_xlim() == pytest.approx((0.0, enlarged.get(k, TIME_S[-1])))
+        end = enlarged.get(name, {}).get(k, TIME_S[-1])
+        assert panel.get_xlim() == pytest.approx((0.0, end), abs=2 * TIME_S[1])
 
 
 @pytest.mark.parametrize("name", PANELS)
@@ -291,6 +302,7 @@ def test_panels_are_lettered_and_no_panel_is_left_over(name):
 @pytest.mark.parametrize(("name", "letter", "run"), CONTROL_PANELS)
 def test_saturated_input_is_a_pale_band_below_the_control(name, letter, run):
     table = tables_of(name)[figure_module(name).TABLES[0]]
+    table = shown(name, letter, table)
     panel = lettered(drawn_once(name))[letter]
     (control,), (saturated,) = (lines_of(panel, table[f"{signal}_{run}"]) for signal in ("control", "saturated"))
     assert saturated.get_linewidth() > 2 * control.get_linewidth()
@@ -316,7 +328,7 @@ def test_pade_panel_shows_the_difference(name, letter, run):
     tables = tables_of(name)
     difference = tables["extended"][f"output_{run}"] - tables["extended"][f"output_{run}_pade"]
     (line,) = lettered(figure_module(name).draw(tables))[letter].lines
-    np.testing.assert_array_equal(line.get_ydata(), difference)
+    np.testing.assert_array_equal(line.get_ydata(), shown(name, letter, tables["extended"].assign(d=difference))["d"])
     assert look(line) == look(Line2D([], [], **style.LINES["second-order Pade"]))
     assert f"at most {difference.abs().max():.3g}" in figure_module(name).caption(tables)
 
@@ -326,18 +338,30 @@ def test_every_test_has_its_errors(tests):
     tables = additive_error_tables(tests)
     table = tables["additive_error"]
     (panel,) = figure_module("fig_2_09").draw(tables).axes
-    *errors, plant, bound = panel.lines
+    *errors, bound, ring, plant = panel.lines
     assert len(errors) == tests
     for number, line in enumerate(errors, start=1):
         rows = table[table["test"] == number]
-        np.testing.assert_array_equal(line.get_xydata(), rows[["omega", "error"]])
+        np.testing.assert_allclose(line.get_xydata(), np.column_stack([rows["omega"], 20 * np.log10(rows["error"])]))
         assert line.get_linestyle() == "None"
-    assert len({(line.get_marker(), line.get_color()) for line in errors}) == tests
-    np.testing.assert_array_equal(bound.get_ydata(), table["bound"][:60])
-    np.testing.assert_array_equal(plant.get_ydata(), table["plant"][:60])
-    assert look(bound) == look(Line2D([], [], **style.LINES["bound"]))
-    assert (panel.get_xscale(), panel.get_yscale()) == ("log", "log")
-    assert panel.get_xlabel() == r"$\omega$ [rad/s]"
+    np.testing.assert_allclose(bound.get_ydata(), 20 * np.log10(table["bound"][:60]))
+    np.testing.assert_allclose(ring.get_xydata(), [[40.0, 20 * np.log10(tests / 40)]])  # error/bound is 10 test/omega^2
+    omega, drawn = plant.get_data()
+    np.testing.assert_allclose(drawn[omega > 70], 20 * np.log10(5 / omega[omega > 70]), atol=0.05)
+    assert panel.get_xscale() == "log"
+    assert (panel.get_xlabel(), panel.get_ylabel()) == (r"$\omega$ [rad/s]", "Magnitude [dB]")
+
+
+def test_a_notch_between_two_lines_is_drawn_round():
+    """|P| of one undamped zero at 500.4 rad/s, of which the lines beside it say how deep it is."""
+    tables, omega = additive_error_tables(1), np.arange(100.0, 900.0)
+    plant = np.abs(1 - (omega / 500.4) ** 2 + 0.02j * omega / 500.4)
+    tables["additive_error"] = pd.DataFrame({"test": 1, "omega": omega, "error": 1e-3, "bound": 1.0, "plant": plant})
+    *_, line = figure_module("fig_2_09").draw(tables).axes[0].lines
+    at, drawn = line.get_data()
+    exact = 20 * np.log10(np.abs(1 - (at / 500.4) ** 2 + 0.02j * at / 500.4))
+    assert at.size > 2 * omega.size
+    assert np.abs(drawn - exact).max() < 0.01
 
 
 def test_largest_errors_survive_thinning():
@@ -350,9 +374,9 @@ def test_largest_errors_survive_thinning():
         {"test": 1, "omega": omega, "error": error, "bound": 10.0, "plant": 1.0}
     ).sample(frac=1, random_state=2)
     errors = figure_module("fig_2_09").draw(tables).axes[0].lines[0]
-    assert len(errors.get_xdata()) <= 500
+    assert len(errors.get_xdata()) <= panels.MOST_POINTS
     drawn = [tuple(point) for point in errors.get_xydata()]
-    assert {(omega[17], 7.0), (omega[4321], 1e-4)} <= set(drawn)
+    assert {(omega[17], 20 * np.log10(7.0)), (omega[4321], 20 * np.log10(1e-4))} <= set(drawn)
 
 
 @pytest.mark.parametrize("above", [0, 2])
@@ -374,7 +398,7 @@ def test_each_beta_has_a_curve_with_its_least_value_and_the_chosen_one_leads(bet
     (panel,) = figure_module("fig_2_10").draw(tables).axes
     assert len(panel.lines) == 2 * len(betas)
     labels = [text.get_text() for text in panel.get_legend().get_texts()]
-    assert labels[0] == rf"$\beta = {captions.fraction(chosen)}$ s (chosen)"
+    assert labels[0] == rf"$\beta$ = {captions.fraction(chosen)} s (chosen)"
     assert sum("chosen" in label for label in labels) == 1
     assert look(panel.lines[0]) == look(Line2D([], [], **style.LINES["family 1"]))
     for curve, dot in zip(panel.lines[::2], panel.lines[1::2], strict=True):
@@ -792,7 +816,7 @@ def test_divergent_signals_leave_the_panel_and_the_reference_stays_legible(name,
             table[column] *= huge ** (TIME_S / TIME_S[-1])
     figure = module.draw(tables)
     for panel in figure.axes:
-        assert np.ptp(panel.get_ylim()) < 500
+        assert np.ptp(panel.yaxis.get_transform().transform(np.array(panel.get_ylim()))) < 500
     assert module.caption(tables)
     if huge > 1e9:
         as_pdf(figure)

@@ -44,5 +44,5 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
             Run(f"{gains}_none", "without anti-windup", "without"),
             Run(f"{gains}_back_calculation", "thesis anti-windup", "with"),
         )
-        axes[letter].set_ylabel(f"Output, {gains} gains")
+        axes[letter].set_ylabel(f"Output [unit of $y$],\n{gains} gains")
     return panels.finished(axes, "ab")

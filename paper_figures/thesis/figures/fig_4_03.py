@@ -11,7 +11,7 @@ from paper_figures.look import panels
 from paper_figures.look.captions import largest, number, of_run, promises, settled
 from paper_figures.look.panels import CORRECTED, THESIS
 from paper_figures.look.style import FULL_WIDTH, styled
-from paper_figures.thesis.figures.shared_chapter_4 import beginning, chosen_limit
+from paper_figures.thesis.figures.shared_chapter_4 import chosen_limit, pade, pade_difference, pade_gone
 
 TABLES: tuple[str, ...] = ("extended", "extended_summary")
 
@@ -19,8 +19,8 @@ TABLES: tuple[str, ...] = ("extended", "extended_summary")
 def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the caption with the numbers of the tables."""
     table, summary = tables["extended"], tables["extended_summary"]
-    difference = panels.pade_difference(table, THESIS)
-    later = difference[table["time_s"] > beginning(tables, "thesis")]
+    difference = pade_difference(table, THESIS)
+    later = difference[table["time_s"] > pade_gone(table, THESIS)]
     thesis, corrected = (
         f"{settled(of_run(summary, run, 'settling_s'))} (to 1 % of the reference's amplitude around its offset), with "
         f"an offset of {number(of_run(summary, run, 'offset'))} over the last period"
@@ -45,6 +45,5 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     for (above, below), run in zip((("a", "b"), ("c", "d")), (THESIS, CORRECTED), strict=True):
         panels.outputs(axes[above], tables["extended"], run)
         panels.errors(axes[below], tables["extended"], run)
-    panels.pade(axes["e"], tables["extended"], THESIS)
-    axes["e"].set_xlim(0, beginning(tables, "thesis"))
+    pade(axes["e"], tables["extended"], THESIS)
     return panels.finished(axes, "ac", "bd")
