@@ -79,7 +79,7 @@ def test_the_keys_name_all_that_is_drawn(tables: Tables) -> None:
 def test_a_search_without_result_is_said(tables: Tables) -> None:
     summary = tables["conditions_summary"]
     tables["conditions_summary"] = summary[summary["search"] != "together, converging"]
-    assert "where the error converges, does not exist" in fig_a_07.caption(tables)
+    assert "where the error converges, none was found" in fig_a_07.caption(tables)
     assert len(fig_a_07.draw(tables).axes) == 6
 
 

@@ -74,7 +74,7 @@ def _nearest(summary: pd.DataFrame, search: str) -> pd.DataFrame:
 
 def _joint(summary: pd.DataFrame, search: str) -> str:
     if (summary["search"] != search).all():
-        return "does not exist"
+        return "none was found"
     best = _nearest(summary, search)
     first = best.iloc[0]
     verdict = "gives them" if best["met"].all() else f"misses by {number(100 * first['worst_miss'], 2)} %"
