@@ -17,7 +17,7 @@ from experiments.thesis.unprinted import wide_search
 from experiments.thesis.unprinted.printed_outcomes import CONVERGED_PERCENT, after_saturation
 from experiments.thesis.unprinted.wide_conditions import CASES, Axis, Case
 from experiments.thesis.unprinted.wide_loops import as_printed, cancelling, plant_4_8, printed_C_aw, without_integrator
-from experiments.thesis.unprinted.wide_search import Tried, wide_conditions_table
+from experiments.thesis.unprinted.wide_search import Tried
 
 NAMED = {case.name: case for case in CASES}
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "thesis" / "unprinted_conditions.md"
@@ -102,3 +102,41 @@ def test_limits_crowd_towards_what_they_exceed() -> None:
     axis = Axis("upper", 10.01, 11.0, above=10.0)
     assert [axis.at(share) for share in (0.0, 0.5, 1.0)] == [10.01, 10.1, 11.0]
     assert Axis("y", -50.0, 100.0).at(1 / 3) == 0.0
+
+
+def nearest_points() -> list[tuple[str, ...]]:
+    """The cells of the page's table of nearest points."""
+    _, _, after = PAGE.read_text(encoding="utf-8").partition("### The nearest points")
+    rows = [line for line in after.partition("\n## ")[0].splitlines() if line.startswith("|")][2:]
+    cells = [tuple(cell.strip() for cell in row.strip("|").split("|")) for row in rows]
+    return [row for row in cells if "none" not in row[2]]
+
+
+@pytest.mark.parametrize("row", nearest_points(), ids=lambda row: f"{row[0]}, {row[1]}")
+def test_the_nearest_points_of_the_page_miss_by_what_it_says(row: tuple[str, ...]) -> None:
+    """Run again, and with other samples."""
+    name, error, point, *_, miss, final = row
+    case = NAMED[name.strip("`")]
+    values = {key: float(value) for key, value in re.findall(r"`(\w+)` (-?[\d.]+)", point)}
+    assert set(values) == {axis.name for axis in case.axes}
+    assert all(axis.low <= values[axis.name] <= axis.high for axis in case.axes)
+    again = Tried(case, np.zeros(0), values, case.outcomes("none", values, 700) | case.outcomes("thesis", values, 700))
+    assert 100 * again.miss(converging=False) == pytest.approx(float(miss.split()[0]), abs=0.3)
+    assert again.outcomes["final_error_percent"] == pytest.approx(float(final.split()[0]), rel=0.05, abs=0.01)
+    assert again.outcomes["final_error_percent"] < CONVERGED_PERCENT or error == "any"
+
+
+def test_what_a_case_adds_brings_it_no_farther(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command, of a search that is over soon."""
+    for name, value in {"COVERING": 4, "STARTS": 1, "EVALUATIONS": 3}.items():
+        monkeypatch.setattr(wide_search, name, value)
+    names = "equal limits", "unequal limits", "theta2 without 1/s"
+    monkeypatch.setattr(wide_search, "CASES", [NAMED[name] for name in names])
+    result = CliRunner().invoke(main, ["thesis", "wide-conditions", "--output", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    table = pd.read_csv(tmp_path / "wide_conditions.csv").set_index("case")
+    miss = table[table["converging"] == 0]["worst_miss"]
+    assert miss["unequal limits"] <= miss["equal limits"] < 1
+    assert (table["final_error_percent"][table["converging"] == 1] < CONVERGED_PERCENT).all()
+    assert "theta2 without 1/s" not in table.index
+    assert table["lower"].notna().equals(pd.Series(table.index == "unequal limits", table.index))

@@ -16,9 +16,9 @@ from experiments.thesis.unprinted.joint_search import least_miss, nearest_readin
 from experiments.thesis.unprinted.printed_outcomes import CONVERGED_PERCENT, READINGS, printed_outcomes
 from experiments.thesis.unprinted.wide_conditions import CASES, Case
 
-COVERING = 9  # log2 of the number of points that cover each case
-STARTS = 5  # of these points, from which the search goes on
-EVALUATIONS = 60  # of one such search, for each condition that is searched
+COVERING = 10  # log2 of the number of points that cover each case
+STARTS = 8  # of these points, from which the search goes on
+EVALUATIONS = 100  # of one such search, for each condition that is searched
 FIRST_STEP = 0.05  # of such a search, as a share of each range
 
 _MOST = 1e6  # stands for an infinite miss: the search takes differences
@@ -59,13 +59,13 @@ def tried(case: Case, shares: np.ndarray, most: float) -> Tried:
     return Tried(case, shares, values, found | (case.outcomes("thesis", values) if near else {}))
 
 
-def wide_conditions_table(cases: Sequence[Case] = CASES, each: Each = threaded) -> pd.DataFrame:
+def wide_conditions_table(cases: Sequence[Case] | None = None, each: Each = threaded) -> pd.DataFrame:
     """For each case the nearest that one point comes to all that chapter 4 prints.
 
     Parameters
     ----------
     cases
-        The first has the axes that all have.
+        :data:`CASES` unless given; the first has the axes that all have.
     each
         Where the pieces of work are done.
 
@@ -85,7 +85,7 @@ def wide_conditions_table(cases: Sequence[Case] = CASES, each: Each = threaded) 
     a local minimum.
     """
     rows, first = [], list[Tried]()
-    for case in cases:
+    for case in CASES if cases is None else cases:
         best = _searched(case, first, each)
         first = first or list(best.values())
         rows += [_row(point, converging) for converging, point in best.items()]
