@@ -78,9 +78,10 @@ def thinned(values: Real, size: int) -> Real:
     count = ceil(len(values) / size)
     blocks = np.full((count * size, values.shape[1]), np.nan)
     blocks[: len(values)] = values
-    blocks = blocks.reshape(count, size, -1)
-    least, greatest = np.fmin.reduce(blocks, axis=1), np.fmax.reduce(blocks, axis=1)
-    first = (blocks == least[:, None]).argmax(axis=1) <= (blocks == greatest[:, None]).argmax(axis=1)
+    cells: np.ndarray = blocks.reshape(count, size, -1)
+    least: np.ndarray = np.fmin.reduce(cells, axis=1)
+    greatest: np.ndarray = np.fmax.reduce(cells, axis=1)
+    first = (cells == least[:, None]).argmax(axis=1) <= (cells == greatest[:, None]).argmax(axis=1)
     ends = np.where(first, least, greatest), np.where(first, greatest, least)
     return np.stack(ends, axis=1).reshape(2 * count, -1)
 
