@@ -34,7 +34,7 @@ $(foreach name,$(filter-out BUILD OUT,$(GIVEN)),$(eval $(call hand,$(name))))
 figures report: export ANTIWINDUP_OUTPUT := $(value BUILD)
 refit: export ANTIWINDUP_OUTPUT := $(value OUT)
 
-.PHONY: help figures report refit claims test suite bench bench-build docs study referee fuzz faults audit lint clean
+.PHONY: help figures report refit claims test suite bench bench-build docs study referee fuzz faults audit lint release-check clean
 help: ## say what there is
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 	@echo
@@ -86,6 +86,27 @@ lint: $(READY) ## check style and types
 	.venv/bin/ruff format --quiet --check .
 	.venv/bin/mypy
 	.venv/bin/lint-imports --no-cache --no-logo
+release-check: $(READY) ## say whether this commit can be released: tree, versions, lint, suite, docs, links, wheel
+	@echo '1 of 7: the tree is clean'
+	@test -z "$$(git status --porcelain)" || { git status --short; exit 1; }
+	@echo '2 of 7: version, changelog and citation agree'
+	@$(PY) -m pytest -q tests/hygiene/test_release.py
+	@echo '3 of 7: lint'
+	@$(MAKE) --no-print-directory lint
+	@echo '4 of 7: the suite'
+	@$(MAKE) --no-print-directory suite
+	@echo '5 of 7: the documentation builds without a warning'
+	@$(MAKE) --no-print-directory docs
+	@echo '6 of 7: the links to other sites (needs the network)'
+	@$(PY) -m sphinx --quiet -b linkcheck -d build/docs/doctrees docs build/docs/links
+	@echo '7 of 7: the wheel builds, and works in a new environment (needs the network)'
+	@rm -rf build/release
+	@$(PY) -m pip wheel --quiet --no-deps --no-build-isolation --no-index --wheel-dir build/release .
+	@$(PYTHON) -m venv build/release/environment
+	@build/release/environment/bin/python -m pip install --quiet --require-hashes --requirement requirements.lock
+	@build/release/environment/bin/python -m pip install --quiet --no-deps --no-index build/release/*.whl
+	@cd build/release && environment/bin/antiwindup --version
+	@cd build/release && environment/bin/antiwindup design extended implied --reference-hz 0.25 --output design.json
 clean: ## remove what was built, but for .venv
 	rm -rf build
 

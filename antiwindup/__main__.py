@@ -45,7 +45,7 @@ class Rooms(CommandGroup):
 
 @click.group(cls=Rooms)
 def main() -> None:
-    """From sine sweeps of a plant with dead time to its anti-windup: models, designs, saturated loops, figures."""
+    """Go from sine sweeps of a plant with dead time to its anti-windup: model, design, saturated loop, figures."""
 
 
 if __name__ == "__main__":

@@ -15,10 +15,15 @@ from identification.base.path_types import INPUT, INPUT_FILE, OUTPUT_FILE
 @click.argument("model")
 @click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)
 @click.option(
-    "--against", type=INPUT_FILE, metavar="DESIGN", help="A design.json of MODEL, looked at on the new plant."
+    "--against",
+    type=INPUT_FILE,
+    metavar="DESIGN",
+    help="A design.json made for MODEL; its margins and its guarantee are computed again for the new plant.",
 )
-@click.option("--junit", type=OUTPUT_FILE, help="JUnit XML to write: a test case for each question and sweep.")
-@click.option("--markdown", type=OUTPUT_FILE, help="Markdown to write, as for a job's summary.")
+@click.option(
+    "--junit", type=OUTPUT_FILE, help="Write JUnit XML here, with a test case for each question and each sweep."
+)
+@click.option("--markdown", type=OUTPUT_FILE, help="Write Markdown here, for example for the summary page of a CI job.")
 @reading_options
 def check(
     model: str,
@@ -28,10 +33,10 @@ def check(
     markdown: Path | None,
     **reading: Any,
 ) -> None:
-    """See whether new SWEEP files still lie within W_a of MODEL, and which parameters moved.
+    """Check whether new SWEEP files lie within the bound W_a of MODEL, and which parameters have moved.
 
-    MODEL is a model.json, or table or implied. The exit status is 0 if all holds, 1 if a sweep leaves W_a, a parameter
-    moved or the design lost what it promises, 2 if the input was refused.
+    MODEL is a model.json, table or implied. The exit status is 0 if everything holds; 1 if a sweep leaves W_a, a
+    parameter has moved or the design has lost a margin or its guarantee; 2 if the input is refused.
     """
     from design.asked_model import asked_model
     from design.design_file import read_design

@@ -29,13 +29,25 @@ if TYPE_CHECKING:
     from antiwindup.steps import Asked, Step
 
 SWEEPS = click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True)
-LIMIT = click.option("--limit", type=float, help="Saturation limits +-LIMIT, instead of the thesis's.")
-MODEL = click.option("--model", help="A model.json, or table or implied: what to draw instead of a fit of SWEEP.")
+LIMIT = click.option("--limit", type=float, help="Use the saturation limits +-LIMIT instead of the thesis's.")
+MODEL = click.option(
+    "--model",
+    help="Draw for this plant instead of a fit of SWEEP: a model.json, or table or implied (the thesis's sets).",
+)
 build_options = together(
-    click.option("--output", required=True, help="Folder to write to."),
-    click.option("--plants", type=click.IntRange(1), default=200, help="Drawn within W_a (Fig. A.6)."),
-    click.option("--jobs", type=click.IntRange(1), help="How many steps run at once; one a processor unless given."),
-    click.option("--force", is_flag=True, help="Replace what stands in the place of an output, whoever wrote it."),
+    click.option("--output", required=True, help="The folder to write to."),
+    click.option(
+        "--plants",
+        type=click.IntRange(1),
+        default=200,
+        help="Number of random plants drawn within the bound W_a (Fig. A.6).",
+    ),
+    click.option(
+        "--jobs", type=click.IntRange(1), help="Number of steps that run at once. Default: one for each processor."
+    ),
+    click.option(
+        "--force", is_flag=True, help="Replace any file in the place of an output, even one that you wrote or changed."
+    ),
     reading_options,
     fit_options,
 )
@@ -48,13 +60,13 @@ build_options = together(
 @signal_options
 @build_options
 def refit(sweeps: tuple[str, ...], **options: Any) -> None:
-    """Fit SWEEP files, design for your axis, simulate, draw and sum up.
+    """Fit SWEEP files, design a controller for your axis, simulate it, draw the results and sum them up.
 
-    What you know of the axis stands in the file of --axis, which `antiwindup new` writes, or in options of the same
-    names. Without, a reference is chosen that the plant can follow with 80 % of the limits.
+    Write what you know of the axis into the file of --axis, which `antiwindup new` makes, or give options of the same
+    names. Without a reference the command chooses one that the plant can follow with 80 % of the limits.
 
-    A second run does what has changed since, and nothing of yours is replaced or removed. Designs and simulations that
-    refuse the plant stop only what needs them.
+    A second run repeats only the steps whose inputs have changed. No file of yours is replaced or removed. When a
+    design or a simulation refuses the plant, only the steps that need it are left out.
     """
     from antiwindup.refit_steps import refit_steps
 
@@ -75,11 +87,13 @@ def refit(sweeps: tuple[str, ...], **options: Any) -> None:
 @click.command("figures")
 @SWEEPS
 @MODEL
-@click.option("--only", metavar="FIGURE", multiple=True, help="Such as fig_2_01; all unless given.")
+@click.option(
+    "--only", metavar="FIGURE", multiple=True, help="Draw only this figure, for example fig_2_01. Default: all."
+)
 @LIMIT
 @build_options
 def figures(sweeps: tuple[str, ...], model: str | None, only: tuple[str, ...], **options: Any) -> None:
-    """Draw the figures of the thesis, and ours, from SWEEP files."""
+    """Draw the thesis's figures and our own (A.1 to A.9) from SWEEP files."""
     from antiwindup.thesis_steps import report_steps, thesis_steps
 
     asked, how = _asked(sweeps, model, **options)
@@ -97,7 +111,7 @@ def figures(sweeps: tuple[str, ...], model: str | None, only: tuple[str, ...], *
 @LIMIT
 @build_options
 def report(sweeps: tuple[str, ...], model: str | None, **options: Any) -> None:
-    """Put the figures with their data, every verdict on the thesis, the fit and the audits on one page of HTML."""
+    """Write one HTML page: the figures with their data, every verdict on the thesis, the fit and the audits."""
     from antiwindup.thesis_steps import report_steps, thesis_steps
 
     asked, how = _asked(sweeps, model, **options)

@@ -21,13 +21,15 @@ from identification.base.path_types import OUTPUT_FILE
     "--limit",
     type=NumberPair(),
     metavar="[LOW] HIGH",
-    help="Limits that the page begins with; unless given, 1.2 times the control that the reference needs.",
+    help="Saturation limits when the page opens. Default: 1.2 times the control that the reference needs.",
 )
 @sinusoid_options
-@click.option("--port", type=click.IntRange(1024, 65535), help="Of 127.0.0.1; a free one unless given.")
-@click.option("--no-browser", is_flag=True, help="Open no browser; the address is printed in any case.")
+@click.option("--port", type=click.IntRange(1024, 65535), help="Port on 127.0.0.1. Default: a free one.")
+@click.option("--no-browser", is_flag=True, help="Do not open a browser. The address is always printed.")
 @click.option(
-    "--output", type=OUTPUT_FILE, help="What 'save' writes; a new name beside DESIGN unless given, never DESIGN itself."
+    "--output",
+    type=OUTPUT_FILE,
+    help="File that the button 'save' writes. Default: a new name beside DESIGN. DESIGN itself is never replaced.",
 )
 def explore(
     design: Path,
@@ -39,11 +41,12 @@ def explore(
     no_browser: bool,
     output: Path | None,
 ) -> None:
-    """Open a local page with sliders for DESIGN: run, Nyquist plot, step, audit.
+    """Open a local page with sliders for DESIGN: run, Nyquist plot, step response, audit.
 
-    All are redrawn as a slider is dragged. The page is for this machine alone, and ends with Ctrl-C. Its address holds
-    what the sliders say, so that a copy of it opens the same page as long as the command runs; "save" writes the
-    design shown as design.json. Without an amplitude the page begins with sinusoids of amplitude 1 at their crests.
+    The page redraws everything while you drag a slider. Only this machine can open it, and Ctrl-C ends it. Its address
+    holds the positions of the sliders: a copy of the address opens the same page as long as the command runs. "save"
+    writes the design that is shown as design.json. Without an amplitude the page begins with sinusoids of amplitude 1
+    at their crests.
     """
     import webbrowser
 

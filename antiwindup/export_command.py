@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from experiments.options import DESIGN, LIMIT_PAIR, asked_limits
+from experiments.options import ANTI_WINDUP, DESIGN, LIMIT_PAIR, asked_limits
 from experiments.pair_options import PairCommand
 from identification.base.axis_option import AXIS
 from identification.base.errors import InputError
@@ -19,26 +19,24 @@ TARGETS = ("c", "matlab", "python", "json", "simulink", "fmu")
 @click.command("export", cls=PairCommand)
 @DESIGN
 @AXIS
-@click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
-@click.option("--to", type=click.Choice(TARGETS), required=True, help="What is written.")
+@click.option("--rate", type=float, required=True, help="Sampling rate of the controller in Hz.")
+@click.option("--to", type=click.Choice(TARGETS), required=True, help="Format to write.")
 @LIMIT_PAIR
-@click.option(
-    "--anti-windup",
-    default="corrected",
-    help="none, thesis, corrected, another of DESIGN, or one of others: see the README.",
-)
+@ANTI_WINDUP
 @click.option(
     "--method",
-    help="How it is discretised, matched, tustin or exact: see the README; unless given, that of `sampled`.",
+    help="Discretisation method: matched, tustin or exact. Default: the one that `sampled` chooses.",
 )
 @click.option(
     "--precision",
     type=click.Choice(["double", "float"]),
     default="double",
-    help="Of all numbers, with --to c.",
+    help="Floating-point type of all numbers in the C code (with --to c).",
 )
-@click.option("--name", default="controller", help="Of the files and of what they define; letters and digits.")
-@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder for the files.")
+@click.option(
+    "--name", default="controller", help="Name of the files and of the functions and types in them; letters and digits."
+)
+@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write the files to.")
 def export(
     design: Path,
     rate: float,
@@ -50,9 +48,9 @@ def export(
     name: str,
     output: Path,
 ) -> None:
-    """Write DESIGN's controller with its anti-windup and limits; with its plant for matlab, simulink and python.
+    """Write DESIGN's controller with its anti-windup and limits; for matlab, simulink and python also its plant.
 
-    Beside it, NAME_test.csv is a run of `sampled` that its commands were checked against.
+    The file NAME_test.csv beside it is a run of `sampled`; the commands of the written controller agree with it.
     """
     from design.design_file import read_design
     from experiments.drive.choose_method import choose_method

@@ -41,13 +41,21 @@ def main() -> None:
 @AXIS
 @frequency_options
 @click.option(
-    "--epsilon", type=float, help="Of the factor s^2 + epsilon of Lambda, rad^2/s^2; constants are held nearly."
+    "--epsilon",
+    type=float,
+    help=(
+        "epsilon of the factor s^2 + epsilon of Lambda, in rad^2/s^2. A constant reference is followed "
+        "with a small error."
+    ),
 )
 @click.option(
     "--integral-action",
     is_flag=True,
-    help="Ours, in place of --epsilon: constant references and constant disturbances at the plant's input leave no "
-    "error; the plant's integrators are not hidden.",
+    help=(
+        "Use integral action instead of --epsilon (not in the thesis). A constant reference and a "
+        "constant disturbance at the plant's input then leave no error, and the controller hides no "
+        "integrator of the plant."
+    ),
 )
 @corrected_options
 @OUTPUT
@@ -63,7 +71,7 @@ def delay_free(
     bandwidth: float | None,
     output: Path,
 ) -> None:
-    """Chapter 2: internal model, H-infinity stabiliser, anti-windup; the plant's dead time is ignored."""
+    """Design by chapter 2: internal model, H-infinity stabiliser, anti-windup. The plant's dead time is ignored."""
     from design.asked_model import asked_model
     from design.chapter_2.design_delay_free import design_delay_free
 
@@ -97,19 +105,35 @@ def delay_free(
 @click.argument("model")
 @AXIS
 @frequency_options
-@click.option("--a", type=float, help="Closed-loop pole of the free part, rad/s; as fast as W_a allows unless given.")
-@click.option("--e", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
-@click.option("--f", type=float, multiple=True, help="Q has the factor s^2 + e s + f for each frequency above 0.")
+@click.option("--a", type=float, help="Closed-loop pole of the free part, in rad/s. Default: as fast as W_a allows.")
 @click.option(
-    "--interpolation", "method", type=click.Choice(METHODS), default="zeros", help="How Q is made to interpolate."
+    "--e",
+    type=float,
+    multiple=True,
+    help="Coefficient of the factor s^2 + e s + f of Q; give it once for each reference frequency above 0.",
 )
-@click.option("--inverse-epsilon", type=float, default=0.0, help="Of R_eps^-1 = R_0^-1/(1 + eps s)^2 (3.2), s.")
+@click.option(
+    "--f",
+    type=float,
+    multiple=True,
+    help="Coefficient of the factor s^2 + e s + f of Q; give it once for each reference frequency above 0.",
+)
+@click.option(
+    "--interpolation",
+    "method",
+    type=click.Choice(METHODS),
+    default="zeros",
+    help="Method that makes Q meet the interpolation conditions.",
+)
+@click.option(
+    "--inverse-epsilon", type=float, default=0.0, help="eps of R_eps^-1 = R_0^-1/(1 + eps s)^2, Eq. (3.2), in seconds."
+)
 @click.option(
     "--robust-level",
     type=float,
     metavar="LEVEL",
-    help=f"T_so rolls off as late as |W_a C S| <= LEVEL < 1 allows; {ROBUST_LEVEL:g} where --a is not given, or the "
-    "plant is outside the thesis's class.",
+    help="Let T_so roll off, as late as |W_a C S| <= LEVEL < 1 allows. "
+    f"Default: {ROBUST_LEVEL:g} if --a is not given or the plant is outside the thesis's class; else no roll-off.",
 )
 @corrected_options
 @OUTPUT
@@ -129,9 +153,10 @@ def extended(
     bandwidth: float | None,
     output: Path,
 ) -> None:
-    """Chapters 3 and 4: controller and anti-windup with the exact dead time, for every plant.
+    """Design by chapters 3 and 4: controller and anti-windup with the exact dead time, for every plant.
 
-    With --reference-hz 0.5 alone the rest is chosen from the reference, the dead time and W_a, and said.
+    --reference-hz 0.5 is enough: the command then chooses the rest from the reference, the dead time and W_a, and
+    prints each choice with its reason.
     """
     from design.asked_model import asked_model
     from design.chapters_3_4.design_extended import design_extended
@@ -160,12 +185,14 @@ def extended(
 
 @main.command("anti-windup")
 @DESIGN
-@click.option("--name", required=True, help="Under which it is kept, and simulated with --anti-windup NAME.")
-@click.option("--numerator", required=True, help="Coefficients, highest power first, as '1 2.5 3'.")
-@click.option("--denominator", required=True, help="Coefficients, highest power first.")
+@click.option("--name", required=True, help="Name of the anti-windup in the design; --anti-windup NAME simulates it.")
+@click.option(
+    "--numerator", required=True, help="Coefficients of the numerator, highest power first, for example '1 2.5 3'."
+)
+@click.option("--denominator", required=True, help="Coefficients of the denominator, highest power first.")
 @OUTPUT
 def anti_windup_command(design: Path, name: str, numerator: str, denominator: str, output: Path) -> None:
-    """Add a theta1~ of your own, strictly proper and stable, to those of DESIGN."""
+    """Add your own anti-windup theta1~ (strictly proper and stable) to DESIGN."""
     from design.anti_windup.compensator import anti_windup
     from design.anti_windup.judge import Compensator, judge
     from design.blocks.block import from_polynomial
@@ -193,11 +220,15 @@ def anti_windup_command(design: Path, name: str, numerator: str, denominator: st
     "--windup",
     type=float,
     default=1.0,
-    help="Integral of u - sat(u), in input unit times second, for the lasting offset.",
+    help="Integral of u - sat(u) for which the lasting offset is given, in the input's unit times second.",
 )
-@click.option("--figure", type=FIGURE_FILE, help="Draw L with W_a's discs, |S|, |T| and |W_a C S|: .pdf, .svg or .png.")
+@click.option(
+    "--figure",
+    type=FIGURE_FILE,
+    help="Draw the Nyquist curve with the discs of W_a, |S|, |T| and |W_a C S| to this file: .pdf, .svg or .png.",
+)
 def audit_command(design: Path, windup: float, figure: Path | None) -> None:
-    """Print stability, margins and |W_a C S| of DESIGN with the exact dead time, and judge every anti-windup in it."""
+    """Print stability, margins and |W_a C S| of DESIGN with the exact dead time, and judge its anti-windups."""
     from design.auditing.as_text import audit_text
     from design.auditing.audit_design import audit
     from design.design_file import read_design

@@ -46,7 +46,7 @@ class Design:
     reference_omegas
         Angular frequencies of the reference in rad/s; 0 is a constant.
     blocks
-        The design's transfer functions by the thesis's names, see README.
+        The design's transfer functions by the thesis's names, see docs/reference/design_json.md.
     hinf
         What the synthesis found; None for an extended design.
     parameters

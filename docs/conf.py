@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 import warnings
@@ -11,20 +10,24 @@ from pathlib import Path
 from types import GenericAlias
 from typing import TYPE_CHECKING, Any
 
+import numba
 from jinja2 import FileSystemLoader
 from jinja2.sandbox import SandboxedEnvironment
 from latex2mathml.converter import convert
 from numpydoc import docscrape_sphinx
 
 if TYPE_CHECKING:
+    from click import Context
     from docutils import nodes
     from sphinx.application import Sphinx
     from sphinx.writers.html5 import HTML5Translator
 
 warnings.filterwarnings("ignore", "Unknown section", module="numpydoc")  # in docstrings of others
-os.environ["NUMBA_DISABLE_JIT"] = "1"  # a compiled function would hide its docstring and its arguments
+# A compiled function would hide its docstring. Not by the environment, which the notebooks would take over.
+numba.config.DISABLE_JIT = True
 ROOT = Path(__file__).resolve().parents[1]
 API = ROOT / "docs" / "reference" / "api"
+COMMANDS = ROOT / "docs" / "reference" / "commands"
 ROOMS = ("identification", "design", "experiments", "paper_figures", "antiwindup")
 LITERAL = re.compile(r"(``.+?``)")
 sys.path.insert(0, str(ROOT))  # data.thesis
@@ -44,13 +47,15 @@ extensions = [
 exclude_patterns = ["images"]
 
 nitpicky = False
+smartquotes_action = "qe"  # and no dashes, of which options are full
+default_role = "literal"
 root_doc = "index"
 
 # pages
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "attrs_inline", "colon_fence"]
 myst_heading_anchors = 4
-nb_execution_mode = "cache"
-nb_execution_cache_path = str(ROOT / "build" / "docs" / "notebooks")
+nb_execution_mode = "force"  # the pages are of the code as it is, which no cache knows
+nb_execution_in_temp = True
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300
 nb_merge_streams = True
@@ -59,6 +64,7 @@ nb_merge_streams = True
 add_module_names = False
 autodoc_typehints = "none"
 autodoc_default_options = {"members": True, "show-inheritance": False}
+viewcode_follow_imported_members = False  # else the way back from the source of a room's face is lost
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 
@@ -70,6 +76,7 @@ docscrape_sphinx.SandboxedEnvironment = lambda loader: TEMPLATES
 html_theme = "pydata_sphinx_theme"
 html_title = "Anti-windup"
 html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_theme_options = {
     "show_toc_level": 2,
@@ -97,6 +104,14 @@ def without_substitutions(*arguments: Any) -> None:
         lines[row] = "".join(part if k % 2 else part.replace("|", r"\|") for k, part in enumerate(parts))
 
 
+def whole_metavars(app: Sphinx, context: Context, lines: list[str]) -> None:
+    """Give an option's value its brackets back, of which sphinx-click takes the outer ones away."""
+    for parameter in context.command.params:
+        if parameter.metavar and "[" in parameter.metavar:
+            cut = f"<{parameter.metavar.strip('[]')}>"
+            lines[:] = [line.replace(cut, f"<{parameter.metavar}>") for line in lines]
+
+
 def of_others(app: Sphinx, what: str, name: str, thing: object, skip: bool, options: object) -> bool | None:
     """Leave out names for types of others: numpydoc cannot write their signatures."""
     return True if isinstance(thing, GenericAlias) else None
@@ -104,6 +119,7 @@ def of_others(app: Sphinx, what: str, name: str, thing: object, skip: bool, opti
 
 def write_api_pages(app: Sphinx) -> None:
     """Write a page for each package of the rooms: what its modules hold, and the packages in it."""
+    API.mkdir(exist_ok=True)
     for room in ROOMS:
         for init in sorted((ROOT / room).rglob("__init__.py")):
             package, folder = ".".join(init.parent.relative_to(ROOT).parts), init.parent
@@ -118,12 +134,40 @@ def write_api_pages(app: Sphinx) -> None:
             (API / f"{package}.rst").write_text("\n".join(lines), encoding="utf-8")
 
 
+def write_command_pages(app: Sphinx) -> None:
+    """Write a page for each command, and one for each group with the commands in it."""
+    from click import Context, Group
+
+    from antiwindup.__main__ import main
+
+    def write(name: str, group: Group) -> None:
+        context = Context(group, info_name=name)
+        found = {each: group.get_command(context, each) for each in group.list_commands(context)}
+        for each, command in found.items():
+            if command is None or not (group is main or isinstance(command, Group)):
+                continue
+            inner = ""
+            if isinstance(command, Group):
+                write(f"{name} {each}", command)
+                leaves = [leaf for leaf, what in command.commands.items() if not isinstance(what, Group)]
+                inner = f"   :nested: full\n   :commands: {', '.join(leaves)}\n"
+            place = f"{command.callback.__module__}:{command.callback.__name__}"
+            text = f".. click:: {place}\n   :prog: {name} {each}\n{inner}"
+            file = COMMANDS / f"{name} {each}.rst".removeprefix("antiwindup ").replace(" ", "_")
+            file.write_text(text, encoding="utf-8")
+
+    COMMANDS.mkdir(exist_ok=True)
+    write("antiwindup", main)
+
+
 def setup(app: Sphinx) -> None:
     """Register what this file adds to Sphinx."""
     app.connect("builder-inited", write_api_pages)
+    app.connect("builder-inited", write_command_pages)
     app.connect("autodoc-process-docstring", without_substitutions)
     for part in ("description", "usage", "options", "arguments", "epilog"):
         app.connect(f"sphinx-click-process-{part}", without_substitutions)
+    app.connect("sphinx-click-process-options", whole_metavars)
     app.connect("autodoc-skip-member", of_others)
     app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
 

@@ -82,7 +82,7 @@ def campaign_distributions(campaign: Path, output: Path) -> None:
     metavar="[LOW] HIGH",
     multiple=True,
     required=True,
-    help="Saturation limits in the actuator's unit, LOW < HIGH, or one number for +- that; repeatable.",
+    help="Saturation limits in the actuator's unit: LOW HIGH, or one number for +- that number; can be repeated.",
 )
 @RATE_LIMIT
 @SCHEDULER
@@ -96,7 +96,7 @@ def limits(
     output: Path,
     **reference: Any,
 ) -> None:
-    """What no controller of DESIGN's plant can better: limits_KIND.csv, limits_KIND_summary.csv (the first LIMIT)."""
+    """Bound the least peak error of any controller within LIMIT: limits_KIND.csv, limits_KIND_summary.csv."""
     from tqdm import tqdm
 
     from design.design_file import read_design
@@ -117,13 +117,13 @@ def limits(
     "--limit",
     type=NumberPair(),
     metavar="[LOW] HIGH",
-    help="Saturation limits in the actuator's unit; +- 1.2 times what the reference needs unless given.",
+    help="Saturation limits in the actuator's unit. Default: +-1.2 times the control that the reference needs.",
 )
 @RATE_LIMIT
 @reference_options
 @OUTPUT_FOLDER
 def compare(design: Path, limit: tuple[float, ...] | None, rate_limit: float, output: Path, **reference: Any) -> None:
-    """The anti-windups of DESIGN beside those of others: compare.csv, compare_runs.csv."""
+    """Compare the anti-windups of DESIGN with published ones: compare.csv, compare_runs.csv."""
     from tqdm import tqdm
 
     from design.design_file import read_design

@@ -13,17 +13,22 @@ from identification.base.errors import InputError
 
 DESIGN = click.argument("design", type=path_types.INPUT_FILE)
 OUTPUT_FOLDER = click.option(
-    "--output", type=path_types.OUTPUT_FOLDER, required=True, help="Existing folder for the tables."
+    "--output", type=path_types.OUTPUT_FOLDER, required=True, help="Existing folder to write the tables to."
 )
 sinusoid_options = together(
-    click.option("--amplitude", type=float, multiple=True, help="Of the reference; once a frequency of DESIGN."),
+    click.option(
+        "--amplitude",
+        type=float,
+        multiple=True,
+        help="Amplitude of the reference; give it once for each frequency of DESIGN.",
+    ),
     click.option(
         "--phase",
         type=float,
         multiple=True,
-        help="In radians; once a frequency; 0 unless given, and pi/2 for a constant.",
+        help="Phase of the reference in radians; give it once for each frequency. Default: 0, for a constant pi/2.",
     ),
-    click.option("--offset", type=float, help="Of the reference, 0 unless given."),
+    click.option("--offset", type=float, help="Constant that is added to the reference. Default: 0."),
 )
 """The sinusoids of a reference: ``--amplitude``, ``--phase`` and ``--offset``."""
 
@@ -32,34 +37,49 @@ reference_options = together(
     click.option(
         "--slope",
         type=float,
-        help="Of a ramp added to the reference, a second; --amplitude 0 leaves it alone.",
+        help=(
+            "Slope per second of a ramp that is added to the reference. With --amplitude 0 the ramp is "
+            "the whole reference."
+        ),
     ),
     click.option(
         "--reference",
         type=path_types.INPUT_FILE,
-        help="CSV of time_s and reference, joined by straight lines or stepping, instead of the sinusoids.",
+        help=(
+            "Read the reference from a CSV file with the columns time_s and reference. Straight lines "
+            "join the rows; two rows of one time are a step."
+        ),
     ),
 )
 """Those, and ``--slope`` and ``--reference``."""
 
+
+ANTI_WINDUP = click.option(
+    "--anti-windup",
+    default="corrected",
+    help="Anti-windup: none, thesis, corrected, one that you added to DESIGN, or a published one: back-calculation, "
+    "conditioning, observer, internal-model, weston-postlethwaite or static.",
+)
 
 LIMIT_PAIR = click.option(
     "--limit",
     type=NumberPair(),
     metavar="[LOW] HIGH",
     required=True,
-    help="Saturation limits in the actuator's unit, LOW < HIGH, or one number for +- that; inf for none.",
+    help="Saturation limits in the actuator's unit: LOW HIGH, or one number for +- that number; inf for no limit.",
 )
 
 RATE_LIMIT = click.option(
     "--rate-limit",
     type=float,
     default=math.inf,
-    help="Most change of the actuator in a second, in its unit, unknown to the controller.",
+    help="Largest change of the actuator's output per second, in its unit. The controller does not know it.",
 )
 
 SCHEDULER = click.option(
-    "--scheduler", metavar="ADDRESS", help="Compute on the Dask cluster with this scheduler, not here."
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Compute on the Dask cluster with this scheduler address instead of on this machine.",
 )
 
 disturbance_options = together(
@@ -68,22 +88,28 @@ disturbance_options = together(
         type=NumberPair(),
         metavar="LEVEL [AT_S]",
         multiple=True,
-        help="From AT_S seconds on (0 unless given) LEVEL is added to the actuator's output, in its unit; repeatable.",
+        help="Add LEVEL to the actuator's output from AT_S seconds on (default 0), in its unit; can be repeated.",
     ),
     click.option(
         "--output-disturbance",
         type=NumberPair(),
         metavar="LEVEL [AT_S]",
         multiple=True,
-        help="The same at the plant's output, in the reference's unit.",
+        help=(
+            "Add LEVEL to the plant's output from AT_S seconds on (default 0), in the reference's unit; "
+            "can be repeated."
+        ),
     ),
     click.option(
         "--noise",
         type=(float, float),
         metavar="STD RATE",
-        help="Adds to what is measured straight lines between RATE normal samples a second, in the reference's unit.",
+        help=(
+            "Add noise to the measured output: straight lines between RATE normal samples per second "
+            "with standard deviation STD, in the reference's unit."
+        ),
     ),
-    click.option("--seed", type=int, help="Of the noise."),
+    click.option("--seed", type=int, help="Seed of the noise."),
 )
 """``--input-disturbance``, ``--output-disturbance``, ``--noise`` and ``--seed``."""
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from experiments.options import DESIGN, LIMIT_PAIR, asked_limits, disturbance_options, reference_options
+from experiments.options import ANTI_WINDUP, DESIGN, LIMIT_PAIR, asked_limits, disturbance_options, reference_options
 from experiments.pair_options import PairCommand
 from experiments.tables import csv_writer
 from identification.base.axis_option import AXIS
@@ -26,11 +26,7 @@ _run_options = together(
     DESIGN,
     AXIS,
     LIMIT_PAIR,
-    click.option(
-        "--anti-windup",
-        default="corrected",
-        help="none, thesis, corrected, another of DESIGN, or one of others: see the README.",
-    ),
+    ANTI_WINDUP,
     click.option("--until", type=float, required=True, help="Length of the run in seconds."),
     reference_options,
     disturbance_options,
@@ -38,22 +34,34 @@ _run_options = together(
         "--rate-limit",
         type=float,
         default=math.inf,
-        help="Most change of the actuator in a second, in its unit, unknown to the controller.",
+        help="Largest change of the actuator's output per second, in its unit. The controller does not know it.",
     ),
     click.option(
-        "--plant", help="The true plant: a model.json, table or implied; the design's own model unless given."
+        "--plant", help="True plant of the loop: a model.json, table or implied. Default: the design's own model."
     ),
-    click.option("--output", type=OUTPUT_FILE, required=True, help="CSV to write."),
-    click.option("--figure", type=FIGURE_FILE, help="Draw the run: .pdf, .svg or .png."),
+    click.option("--output", type=OUTPUT_FILE, required=True, help="The CSV file to write."),
+    click.option("--figure", type=FIGURE_FILE, help="Draw the run to this file: .pdf, .svg or .png."),
 )
 
 
 @click.command("simulate", cls=PairCommand)
 @_run_options
-@click.option("--sample-time", type=float, required=True, help="Distance of the output's rows in seconds.")
-@click.option("--alpha", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
-@click.option("--beta", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
-@click.option("--gamma", type=float, help="Of theta1~ (2.23), instead of the design's; with --anti-windup thesis.")
+@click.option("--sample-time", type=float, required=True, help="Time between two rows of the output, in seconds.")
+@click.option(
+    "--alpha",
+    type=float,
+    help="Coefficient of theta1~, Eq. (2.23), instead of the design's (with --anti-windup thesis).",
+)
+@click.option(
+    "--beta",
+    type=float,
+    help="Coefficient of theta1~, Eq. (2.23), instead of the design's (with --anti-windup thesis).",
+)
+@click.option(
+    "--gamma",
+    type=float,
+    help="Coefficient of theta1~, Eq. (2.23), instead of the design's (with --anti-windup thesis).",
+)
 def simulate_command(
     design: Path,
     limit: tuple[float, ...],
@@ -73,7 +81,7 @@ def simulate_command(
     figure: Path | None,
     **reference: Any,
 ) -> None:
-    """Run DESIGN from rest: time_s, reference, output, error, control, saturated_control; with noise measured."""
+    """Run DESIGN from rest; write time_s, reference, output, error, control, saturated_control (and measured)."""
     import numpy as np
     import pandas as pd
     from tqdm import tqdm
@@ -154,24 +162,31 @@ def simulate_command(
 
 @click.command("sampled", cls=PairCommand)
 @_run_options
-@click.option("--rate", type=float, required=True, help="Samples of the controller in a second.")
+@click.option("--rate", type=float, required=True, help="Sampling rate of the controller in Hz.")
 @click.option(
     "--method",
-    help="How it is discretised, matched, tustin or exact: see the README; unless given, that of least steady error "
-    "among those with a stable linear loop.",
+    help=(
+        "Discretisation method: matched, tustin or exact. Default: among those with a stable linear "
+        "loop, the one with the least steady error."
+    ),
 )
-@click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels in its unit; 0, no levels.")
-@click.option("--input-delay", type=float, default=0.0, help="From sample to actuator in seconds.")
+@click.option(
+    "--quantum",
+    type=float,
+    default=0.0,
+    help="Distance between two levels of the actuator, in its unit; 0 for no levels.",
+)
+@click.option("--input-delay", type=float, default=0.0, help="Delay from the sample to the actuator, in seconds.")
 @click.option(
     "--form",
     default="coprime",
-    help="How the controller is realised: coprime, without hidden modes, or thesis, as drawn in Fig. 2.6.",
+    help="Realisation of the controller: coprime (no hidden modes) or thesis (as drawn in Fig. 2.6).",
 )
 @click.option(
     "--resolution",
     type=float,
     default=0.0,
-    help="Of the computer's own numbers, in the actuator's unit; 0, as fine as doubles.",
+    help="Resolution of the computer's numbers, in the actuator's unit; 0 for double precision.",
 )
 def sampled_command(
     design: Path,
@@ -194,9 +209,10 @@ def sampled_command(
     figure: Path | None,
     **reference: Any,
 ) -> None:
-    """Run DESIGN's controller on a computer with a real actuator, a row each sample, the columns as of simulate.
+    """Run DESIGN's controller on a computer with a real actuator; write a row for each sample.
 
-    Of these, control is what the computer asks for, and saturated_control what the actuator gives out.
+    The columns are those of `simulate`: control is the command of the computer, saturated_control the output of the
+    actuator.
     """
     import pandas as pd
     from tqdm import tqdm

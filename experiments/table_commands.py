@@ -28,7 +28,7 @@ from identification.base.axis_option import AXIS
 @RATE_LIMIT
 @OUTPUT_FOLDER
 def tracking_command(design: Path, limit: tuple[float, ...], rate_limit: float, output: Path, **reference: Any) -> None:
-    """Run DESIGN from rest with none, the corrected and every added anti-windup: tracking.csv, tracking_summary.csv."""
+    """Run DESIGN from rest without, with the corrected and with every added anti-windup: tracking.csv, _summary.csv."""
     from design.design_file import read_design
     from experiments.asked_reference import reference_of
     from experiments.tracking import tracking_tables
@@ -44,9 +44,14 @@ def tracking_command(design: Path, limit: tuple[float, ...], rate_limit: float, 
 @LIMIT_PAIR
 @reference_options
 @RATE_LIMIT
-@click.option("--rate", type=float, help="Of the computer in Hz, beside those that suit the controller.")
-@click.option("--quantum", type=float, default=0.0, help="Distance of the actuator's levels in its unit; 0, no levels.")
-@click.option("--input-delay", type=float, default=0.0, help="From sample to actuator in seconds.")
+@click.option("--rate", type=float, help="Also run at this sampling rate, in Hz.")
+@click.option(
+    "--quantum",
+    type=float,
+    default=0.0,
+    help="Distance between two levels of the actuator, in its unit; 0 for no levels.",
+)
+@click.option("--input-delay", type=float, default=0.0, help="Delay from the sample to the actuator, in seconds.")
 @OUTPUT_FOLDER
 def rates_command(
     design: Path,
@@ -58,7 +63,7 @@ def rates_command(
     output: Path,
     **reference: Any,
 ) -> None:
-    """Run DESIGN's controller on a computer, at 2 to 64 samples in a period of its fastest root: rates.csv."""
+    """Run DESIGN's controller on a computer at 2 to 64 samples per period of its fastest root: rates.csv."""
     from tqdm import tqdm
 
     from design.design_file import read_design

@@ -58,7 +58,7 @@ class Columns(click.ParamType):  # type: ignore[type-arg]  # as above
 
 @click.group(cls=CommandGroup)
 def main() -> None:
-    """From sine sweeps to a plant model with its uncertainty."""
+    """Identify a plant model and its uncertainty from sine sweeps."""
 
 
 reading_options = together(
@@ -66,15 +66,20 @@ reading_options = together(
         "--columns",
         type=Columns(),
         metavar="NAME=OURS,...",
-        help='What a file calls a column and we do, such as "Frequency (Hz)=frequency_hz".',
+        help=(
+            'Names of columns: the name in the file, =, the name that we use; for example "Frequency '
+            '(Hz)=frequency_hz".'
+        ),
     ),
     click.option(
         "--node",
         type=int,
-        help="In a universal file of several: of the response, or the reference if only that varies.",
+        help=(
+            "Node to read from a universal file with several: of the response, or of the reference if only that varies."
+        ),
     ),
-    click.option("--direction", type=int, help="The same, where one node has several."),
-    click.option("--resample", is_flag=True, help="Bring records with uneven time stamps to an even grid."),
+    click.option("--direction", type=int, help="Direction to read from a universal file where the node has several."),
+    click.option("--resample", is_flag=True, help="Interpolate records with uneven time stamps to an even grid."),
 )
 """What a file of sweeps does not say itself; the values are those of ``Reading``."""
 
@@ -95,61 +100,70 @@ fit_options = together(
         default="auto",
         type=Counts(8),
         metavar="auto|N|Z/P",
-        help="Zero and pole modes, up to 8.",
+        help="Number of zero and pole modes, up to 8: one number for both, or ZEROS/POLES.",
     ),
     click.option(
         "--real",
         default="auto",
         type=Counts(3),
         metavar="auto|N|Z/P",
-        help="Real zeros and poles, up to 3.",
+        help="Number of real zeros and poles, up to 3: one number for both, or ZEROS/POLES.",
     ),
     click.option(
         "--integrators",
         default="auto",
         type=click.Choice(["auto", "-2", "-1", "0", "1", "2"]),
-        help="Poles at s = 0; a negative number counts zeros there.",
+        help="Number of poles at s = 0; a negative number counts zeros at s = 0.",
     ),
     click.option(
         "--band",
         type=(float, float),
         callback=_band,
         metavar="LOW HIGH",
-        help="Ends in Hz of the lines that are used; unless given, noise at both ends of a test is left out.",
+        help=(
+            "Use only the lines between LOW and HIGH, in Hz. Default: lines that are mostly noise at "
+            "both ends of a test are left out."
+        ),
     ),
     click.option(
         "--loss",
         default="least-squares",
         type=click.Choice(["least-squares", "soft-l1"]),
-        help="soft-l1: outliers can hardly move the fit.",
+        help="Loss function of the fit; soft-l1 reduces the influence of outliers.",
     ),
     click.option(
         "--bound-order",
         default=2,
         type=click.IntRange(1, HIGHEST_ORDER),
-        help="Poles of W_a; 2 is Eq. (2.22).",
+        help="Number of poles of the bound W_a; 2 is Eq. (2.22).",
     ),
     click.option(
         "--bound-below",
         type=click.FloatRange(min=0, min_open=True),
         metavar="LEVEL",
-        help="Most that plants differ from the model below the lowest line, output unit per input unit; W_a covers it.",
+        help=(
+            "Largest distance of a plant from the model below the lowest line, in output units per input "
+            "unit. W_a covers it."
+        ),
     ),
     click.option(
         "--bound-above",
         type=click.FloatRange(min=0, min_open=True),
         metavar="LEVEL",
-        help="The same from the highest line to ten times it; above, W_a falls off like 1/s.",
+        help=(
+            "Largest distance of a plant from the model from the highest line to ten times its "
+            "frequency. Above, W_a falls off like 1/s."
+        ),
     ),
-    click.option("--seed", default=0, type=click.IntRange(min=0), help="Of the random restarts."),
+    click.option("--seed", default=0, type=click.IntRange(min=0), help="Seed of the random restarts of the fit."),
 )
 """How a fit is made."""
 
 signal_options = together(
-    click.option("--input-name", default="input", help="What the plant's input is called."),
-    click.option("--input-unit", default="", show_default=False, help="Its unit, such as A."),
-    click.option("--output-name", default="output", help="What the plant's output is called."),
-    click.option("--output-unit", default="", show_default=False, help="Its unit, such as m."),
+    click.option("--input-name", default="input", help="Name of the plant's input."),
+    click.option("--input-unit", default="", show_default=False, help="Unit of the plant's input, for example A."),
+    click.option("--output-name", default="output", help="Name of the plant's output."),
+    click.option("--output-unit", default="", show_default=False, help="Unit of the plant's output, for example m."),
 )
 """Names and units of the plant's input and output, which model.json and what is made of it keep."""
 
@@ -161,9 +175,13 @@ signal_options = together(
 @click.option(
     "--responses",
     type=OUTPUT_FILE,
-    help="Keep the responses as they were fitted in this .npz, to be given as a SWEEP later.",
+    help="Keep the fitted responses in this .npz file; later commands read it as a SWEEP.",
 )
-@click.option("--figure", type=FIGURE_FILE, help="Draw the tests and the model as a Bode diagram: .pdf, .svg or .png.")
+@click.option(
+    "--figure",
+    type=FIGURE_FILE,
+    help="Draw a Bode diagram of the tests and the model to this file: .pdf, .svg or .png.",
+)
 @reading_options
 @fit_options
 @signal_options
@@ -187,7 +205,9 @@ def fit(
     figure: Path | None,
     **reading: Any,
 ) -> None:
-    """Fit gain, integrators, modes, real roots and dead time to SWEEP files (raw records or frequency responses)."""
+    """Fit a plant (gain, integrators, modes, real roots, dead time) and its bound W_a to SWEEP files.
+
+    A SWEEP is a raw record or a frequency response."""
     from tqdm import tqdm
 
     from identification.fit_model import fit_model

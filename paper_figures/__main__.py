@@ -22,7 +22,7 @@ OUTPUT = click.option("--output", type=OUTPUT_FOLDER, required=True, help="Exist
 
 @click.group(cls=CommandGroup)
 def main() -> None:
-    """Draw a fit, sum up a plant, draw the figures of the thesis and put them on a page."""
+    """Draw a fit, sum up a plant, draw the thesis's figures, write the report."""
 
 
 @main.command()
@@ -31,11 +31,11 @@ def main() -> None:
     "--results",
     type=INPUT,
     required=True,
-    help="Folder of the tables that the experiments wrote.",
+    help="Folder with the tables that the experiments wrote.",
 )
 @OUTPUT
 def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
-    """Draw the figures NAME..., such as fig_2_01, each as PDF, SVG and PNG with its caption as text."""
+    """Draw the figures NAME (for example fig_2_01) as PDF, SVG and PNG with the caption as text."""
     from paper_figures.look import style
     from paper_figures.result_tables import read_table, sentences_of
     from paper_figures.thesis.figure_registry import figure_module
@@ -55,11 +55,11 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
     "--refit",
     type=INPUT,
     required=True,
-    help="Folder of design.json, with the tables in its folder results.",
+    help="Folder of a refit: it holds design.json and the folder results with the tables.",
 )
 @OUTPUT
 def axis_command(names: tuple[str, ...], refit: Path, output: Path) -> None:
-    """Draw NAME..., such as run or rates, of a refit: each as PDF, SVG and PNG with its caption as text."""
+    """Draw the figures NAME (for example run or rates) of a refit, as PDF, SVG and PNG with the caption as text."""
     from design.design_file import read_design
     from paper_figures.axis_figures.registry import axis_figure
     from paper_figures.look import style
@@ -82,10 +82,10 @@ def axis_command(names: tuple[str, ...], refit: Path, output: Path) -> None:
     "--build",
     type=OUTPUT_FOLDER,
     required=True,
-    help="Existing folder of the designs, with the tables in its folder results; to write to, too.",
+    help="Existing folder with the designs and the folder results with the tables; the summary is written to it.",
 )
 def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
-    """Say what to do with MODEL, fitted to SWEEP files, and what not, and why: summary.pdf, .svg, .png and .txt."""
+    """Sum up MODEL, fitted to SWEEP files: what to do, what to avoid, and why (summary.pdf, .svg, .png, .txt)."""
     from identification.model.model_file import read_model
     from identification.sweeps.as_fitted import as_fitted
     from identification.sweeps.read_sweeps import read_sweeps
@@ -112,7 +112,7 @@ def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
 @click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)
 @OUTPUT
 def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
-    """Draw SWEEP files, MODEL and the distances under W_a: bode.pdf, .svg and .png, with a caption in bode.txt."""
+    """Draw a Bode diagram of SWEEP files and MODEL, and the distances under W_a: bode.pdf, .svg, .png, .txt."""
     from identification.model.model_file import read_model
     from identification.sweeps.as_fitted import as_fitted
     from identification.sweeps.read_sweeps import read_sweeps
@@ -142,10 +142,10 @@ def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
     "--build",
     type=OUTPUT_FOLDER,
     required=True,
-    help="Existing folder of claims.csv, the designs, results and figures; to write report/index.html to.",
+    help="Existing folder with claims.csv, the designs, results and figures; report/index.html is written to it.",
 )
 def report_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
-    """Put all that was made for MODEL (a model.json, table or implied) and SWEEP files on one page of HTML."""
+    """Write one HTML page with all that was made for MODEL (a model.json, table or implied) and SWEEP files."""
     from paper_figures.result_tables import sentences_of
     from paper_figures.thesis.figure_registry import figure_module, figure_names
     from paper_figures.thesis.report.build_folder import read_build, summaries

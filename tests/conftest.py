@@ -5,11 +5,11 @@ from __future__ import annotations
 import gc
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from math import tau
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # what the fixtures need they import, since pytest-xdist's fi
     from identification.model.model_file import IdentifiedModel
 
 LONGEST = (
+    "hygiene/test_site.py",  # builds the documentation
     "claims/test_ledger.py",  # compiles the engine, while another worker fits
     "unit/test_first_contact.py",
     "unit/test_fit.py",
@@ -57,6 +58,7 @@ LONGEST = (
     "unit/test_loop_plots.py",
     "unit/test_sizes.py",
     "unit/test_unprinted_conditions.py",
+    "unit/test_schemas.py",
 )
 """Those of five seconds or more."""
 
@@ -94,6 +96,35 @@ def searched_once() -> Iterator[None]:
             patch.setattr(module, name, cache(getattr(module, name)))
         for module in (audit_design, guarantee, robustness, loop_curves):
             patch.setattr(module, "margins_of", margins)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def written_as_the_schemas_say() -> Iterator[None]:
+    """Every model.json and design.json that a test writes in its own process is valid by its schema."""
+    from json import loads
+
+    from jsonschema import Draft202012Validator
+
+    from design.design_file import Design
+    from identification.model.model_file import IdentifiedModel
+
+    root = Path(__file__).resolve().parents[1]
+    schemas = {IdentifiedModel: "identification/model/model.schema.json", Design: "design/design.schema.json"}
+    with pytest.MonkeyPatch.context() as patch:
+        for kind, file in schemas.items():
+            validator = Draft202012Validator(loads((root / file).read_text(encoding="utf-8")))
+
+            def to_json(
+                self: IdentifiedModel | Design,
+                write: Callable[[Any], str] = kind.to_json,
+                validate: Callable[[object], None] = validator.validate,
+            ) -> str:
+                text = write(self)
+                validate(loads(text))
+                return text
+
+            patch.setattr(kind, "to_json", to_json)
         yield
 
 

@@ -18,13 +18,16 @@ MOST_PERIODS = 10**4
 
 plant_options = together(
     DESIGN,
-    click.option("--plants", type=int, required=True, help="How many plants."),
+    click.option("--plants", type=int, required=True, help="Number of plants."),
     click.option(
-        "--seed", type=int, required=True, help="Of the random numbers; plant i is the same in every campaign."
+        "--seed",
+        type=int,
+        required=True,
+        help="Seed of the random numbers; with one seed, plant i is the same in every campaign.",
     ),
     SCHEDULER,
-    click.option("--output", type=OUTPUT_FILE, required=True, help="Parquet file to write."),
-    click.option("--anew", is_flag=True, help="Remove what another campaign that was interrupted has kept there."),
+    click.option("--output", type=OUTPUT_FILE, required=True, help="The Parquet file to write."),
+    click.option("--anew", is_flag=True, help="Start anew: remove what an interrupted campaign has kept there."),
 )
 """Which plants a campaign has, and where it runs."""
 
@@ -37,8 +40,10 @@ plant_options = together(
 @click.option(
     "--periods",
     type=int,
-    help="Length of a run in periods of the reference; unless given 5, or as many as the loop takes, and half "
-    "as many more where it takes longer than its poles do.",
+    help=(
+        "Length of a run in periods of the reference. Default: 5, or as many as the loop needs to "
+        "settle; half as many again where a run settles later than its poles say."
+    ),
 )
 @sinusoid_options
 def campaign_command(

@@ -55,8 +55,9 @@ def campaign_tables(path: Path) -> dict[str, pd.DataFrame]:
     dict
         ``campaign``: for each anti-windup (run) and share of the plants (1/200 to 1) the peak_error, steady_error and
         recovery_s that so many of them do not exceed. ``campaign_distance``: for each run and each tenth of the
-        distance (from, to) the number of plants there, and the shares of them whose linear loop is stable
-        (linear_stable), whose run diverges, recovers and is covered by its guarantee; empty where there is no plant.
+        distance (from, to) the number of plants there, the shares of them whose linear loop is stable (linear_stable),
+        whose run diverges, recovers and is covered by its guarantee, and the least and the greatest peak error
+        (least_peak_error, greatest_peak_error: empty of a run that diverges); empty where there is no plant.
         ``campaign_summary``: for each run plants, seed, lower_limit, limit, rate_limit (empty: none), horizon_s, the
         four shares among all plants, the guaranteed_sector (0: nothing is guaranteed of these plants), the 5, 50 and
         95 % quantiles of the three numbers, and worst_plant, that of the largest steady error; of several, such as
@@ -75,17 +76,18 @@ def campaign_tables(path: Path) -> dict[str, pd.DataFrame]:
     """
     facts = _facts(path)
     _require_sealed(path)
-    counts, sectors, worst = _count(path, facts["plants"])
+    counts, peaks, sectors, worst = _count(path, facts["plants"])
     steps = np.arange(1, STEPS + 1)
     values = _order_statistics(path, -(-steps * facts["plants"] // STEPS) - 1)
     quantiles = np.where(np.isfinite(values), values, np.nan)
     edges = np.linspace(0.0, 1.0, BINS + 1)
     distributions, distances, rows = [], [], []
-    for name, of_run, count, sector, plant in zip(RUNS, quantiles, counts, sectors, worst, strict=True):
+    for name, of_run, count, ends, sector, plant in zip(RUNS, quantiles, counts, peaks, sectors, worst, strict=True):
         measured = dict(zip(MEASURES, of_run, strict=True))
         distributions.append(pd.DataFrame({"run": name, "share": steps / STEPS} | measured))
         plants, *outcomes = count
         shares = {what: part / np.where(plants, plants, np.nan) for what, part in zip(OUTCOMES, outcomes, strict=True)}
+        shares |= dict(zip(("least_peak_error", "greatest_peak_error"), ends, strict=True))
         distances.append(pd.DataFrame({"run": name, "from": edges[:-1], "to": edges[1:], "plants": plants} | shares))
         row = {"run": name} | facts | {"rate_limit": of_table(facts["rate_limit"])}
         row |= {what: part.sum() / facts["plants"] for what, part in zip(OUTCOMES, outcomes, strict=True)}
@@ -187,9 +189,13 @@ def _checked(path: Path, piece: Columns) -> Columns:
     return piece | measured | {"run": run}
 
 
-def _count(path: Path, plants: int) -> tuple[np.ndarray, np.ndarray, list[int]]:
-    """How many plants, and with each of OUTCOMES, by (run, which of five, bin); each run's sector and worst plant."""
+def _count(path: Path, plants: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[int]]:
+    """How many plants, and with each of OUTCOMES, by (run, which of five, bin); peaks; each run's sector, worst plant.
+
+    The peaks are the least and the greatest peak error by (run, which of two, bin), NaN where there is none.
+    """
     counts = np.zeros((len(RUNS), 1 + len(OUTCOMES), BINS), dtype=np.int64)
+    peaks = np.full((len(RUNS), 2, BINS), np.inf) * [[1.0], [-1.0]]
     sectors = np.full((2, len(RUNS)), np.nan)  # the least and the largest, which are one
     worst = [(-1.0, 0.0, 0)] * len(RUNS)  # steady error, -distance, -plant
     for piece in _read(path):
@@ -199,6 +205,8 @@ def _count(path: Path, plants: int) -> tuple[np.ndarray, np.ndarray, list[int]]:
         outcomes = (every, piece["linear_stable"], piece["diverged"], recovered, piece["covered"])
         for k, what in enumerate(outcomes):
             np.add.at(counts[:, k], (piece["run"][what], bins[what]), 1)
+        np.minimum.at(peaks[:, 0], (piece["run"], bins), piece["peak_error"])
+        np.maximum.at(peaks[:, 1], (piece["run"], bins), piece["peak_error"])
         for run in range(len(RUNS)):
             own = piece["run"] == run
             order = np.column_stack([piece["steady_error"], -piece["distance"], -piece["plant"]])[own]
@@ -211,7 +219,7 @@ def _count(path: Path, plants: int) -> tuple[np.ndarray, np.ndarray, list[int]]:
             raise InputError(f"{path}: {found} rows with anti_windup {name}; expected one for each of {plants} plants")
     if (sectors[0] != sectors[1]).any():
         raise InputError(f"{path}: the guaranteed_sector of one anti_windup differs; expected one of each")
-    return counts, sectors[1], [int(-plant) for _, _, plant in worst]
+    return counts, np.where(np.isfinite(peaks), peaks, np.nan), sectors[1], [int(-plant) for _, _, plant in worst]
 
 
 def _order_statistics(path: Path, ranks: np.ndarray) -> np.ndarray:

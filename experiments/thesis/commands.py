@@ -17,12 +17,12 @@ from identification.base.command_line import CommandGroup
 from identification.base.errors import InputError
 from identification.base.path_types import INPUT
 
-LIMIT = click.option("--limit", type=float, help="Saturation limits +-LIMIT, instead of the thesis's.")
+LIMIT = click.option("--limit", type=float, help="Use the saturation limits +-LIMIT instead of the thesis's.")
 
 
 @click.group("thesis", cls=CommandGroup)
 def thesis() -> None:
-    """Reproduce and judge the print: its experiments, claims and equations."""
+    """Reproduce and judge the thesis: its experiments, claims and equations."""
 
 
 thesis.add_command(claims_command)
@@ -33,7 +33,7 @@ thesis.add_command(equations_command)
 @thesis.command("pid")
 @OUTPUT_FOLDER
 def pid(output: Path) -> None:
-    """The PID benchmark of section 2.2: pid.csv, pid_summary.csv."""
+    """Simulate the PID benchmark of section 2.2: pid.csv, pid_summary.csv."""
     from experiments.thesis.studies.pid import pid_tables
 
     write_into(output, pid_tables())
@@ -43,7 +43,7 @@ def pid(output: Path) -> None:
 @DESIGN
 @OUTPUT_FOLDER
 def f_gamma(design: Path, output: Path) -> None:
-    """The parameter study of f(gamma) for the bound of DESIGN: f_gamma.csv, f_gamma_summary.csv."""
+    """Compute f over gamma for the bound of DESIGN: f_gamma.csv, f_gamma_summary.csv."""
     from design.design_file import read_design
     from experiments.thesis.studies.f_gamma import f_gamma_tables
 
@@ -54,7 +54,7 @@ def f_gamma(design: Path, output: Path) -> None:
 @DESIGN
 @OUTPUT_FOLDER
 def trade_off(design: Path, output: Path) -> None:
-    """f of the corrected anti-windup over recovery time and sector: trade_off.csv, trade_off_summary.csv."""
+    """Compute f of the corrected anti-windup over recovery time and sector: trade_off.csv, trade_off_summary.csv."""
     from tqdm import tqdm
 
     from design.design_file import read_design
@@ -69,7 +69,7 @@ def trade_off(design: Path, output: Path) -> None:
 @DESIGN
 @OUTPUT_FOLDER
 def interpolation(design: Path, output: Path) -> None:
-    """Where each design of Q works: interpolation.csv, interpolation_map.csv, interpolation_summary.csv."""
+    """Map where each design of Q works: interpolation.csv, interpolation_map.csv, interpolation_summary.csv."""
     from design.design_file import read_design
     from experiments.thesis.studies.interpolation import interpolation_tables
 
@@ -80,7 +80,7 @@ def interpolation(design: Path, output: Path) -> None:
 @click.argument("designs", metavar="DESIGN...", nargs=-1, required=True, type=INPUT)
 @OUTPUT_FOLDER
 def robustness(designs: tuple[Path, ...], output: Path) -> None:
-    """|W_a C S| and the margins of each DESIGN, named by its file: robustness.csv, robustness_summary.csv."""
+    """Compute |W_a C S| and the margins of each DESIGN: robustness.csv, robustness_summary.csv."""
     from design.design_file import read_design
     from experiments.thesis.studies.robustness import robustness_tables
 
@@ -95,7 +95,7 @@ def robustness(designs: tuple[Path, ...], output: Path) -> None:
 @LIMIT
 @OUTPUT_FOLDER
 def chapter_2(design: Path, limit: float | None, output: Path) -> None:
-    """The chapter 2 loop: delay_free.csv, delay_free_summary.csv."""
+    """Simulate the loop of chapter 2: delay_free.csv, delay_free_summary.csv."""
     from design.design_file import read_design
     from experiments.thesis.studies.chapter_2 import delay_free_tables
 
@@ -107,7 +107,7 @@ def chapter_2(design: Path, limit: float | None, output: Path) -> None:
 @LIMIT
 @OUTPUT_FOLDER
 def chapter_4(design: Path, limit: float | None, output: Path) -> None:
-    """The chapter 4 loop: extended.csv, extended_summary.csv."""
+    """Simulate the loop of chapter 4: extended.csv, extended_summary.csv."""
     from design.design_file import read_design
     from experiments.thesis.studies.chapter_4 import extended_tables
 
@@ -119,7 +119,7 @@ def chapter_4(design: Path, limit: float | None, output: Path) -> None:
 @SCHEDULER
 @OUTPUT_FOLDER
 def limits(design: Path, scheduler: str | None, output: Path) -> None:
-    """What no controller of DESIGN's plant can better: limits_KIND.csv, limits_KIND_summary.csv."""
+    """Bound the least peak error of any controller within the limits: limits_KIND.csv, limits_KIND_summary.csv."""
     from tqdm import tqdm
 
     from design.design_file import read_design
@@ -138,7 +138,7 @@ def limits(design: Path, scheduler: str | None, output: Path) -> None:
 @SCHEDULER
 @OUTPUT_FOLDER
 def conditions(scheduler: str | None, output: Path) -> None:
-    """What the thesis does not print, searched by what it does: conditions.csv, conditions_summary.csv."""
+    """Search for the conditions that the thesis does not print: conditions.csv, conditions_summary.csv."""
     from functools import partial
 
     from tqdm import tqdm
@@ -151,12 +151,27 @@ def conditions(scheduler: str | None, output: Path) -> None:
         write_into(output, conditions_tables(each=partial(there, tick=bar.update)))
 
 
+@thesis.command("wide-conditions")
+@OUTPUT_FOLDER
+def wide_conditions(output: Path) -> None:
+    """More of what the thesis does not print, in some ten minutes: wide_conditions.csv."""
+    from functools import partial
+
+    from tqdm import tqdm
+
+    from experiments.runs.batch import threaded
+    from experiments.thesis.unprinted.wide_search import wide_conditions_table
+
+    with tqdm(desc="conditions", unit="", disable=None, leave=False) as bar:
+        write_into(output, {"wide_conditions": wide_conditions_table(each=partial(threaded, tick=bar.update))})
+
+
 @thesis.command("sampled-rates")
 @DESIGN
 @LIMIT
 @OUTPUT_FOLDER
 def sampled_rates(design: Path, limit: float | None, output: Path) -> None:
-    """The chapter 4 loop on a computer with a real drive, over its rate: sampled.csv, sampled_summary.csv."""
+    """Run the loop of chapter 4 on a computer at several sampling rates: sampled.csv, sampled_summary.csv."""
     from design.design_file import read_design
     from experiments.thesis.studies.sampled_rates import sampled_rates_tables
 
@@ -168,7 +183,7 @@ def sampled_rates(design: Path, limit: float | None, output: Path) -> None:
 @LIMIT
 @OUTPUT_FOLDER
 def compare(design: Path, limit: float | None, output: Path) -> None:
-    """The anti-windups of DESIGN beside those of others: compare.csv, compare_runs.csv."""
+    """Compare the anti-windups of DESIGN with published ones: compare.csv, compare_runs.csv."""
     from tqdm import tqdm
 
     from design.design_file import read_design
@@ -186,7 +201,7 @@ def compare(design: Path, limit: float | None, output: Path) -> None:
 @LIMIT
 @OUTPUT_FOLDER
 def hidden_modes(design: Path, limit: float | None, output: Path) -> None:
-    """What rounding makes of an hour of the chapter 4 loop: hidden_modes.csv, hidden_modes_summary.csv."""
+    """Run the loop of chapter 4 for an hour with rounded states: hidden_modes.csv, hidden_modes_summary.csv."""
     from tqdm import tqdm
 
     from design.design_file import read_design
@@ -203,7 +218,7 @@ def hidden_modes(design: Path, limit: float | None, output: Path) -> None:
 def campaign(
     design: Path, plants: int, seed: int, scheduler: str | None, output: Path, anew: bool, limit: float | None
 ) -> None:
-    """Run DESIGN with plants drawn inside W_a, as the command campaign does."""
+    """Run DESIGN with plants drawn within W_a, like the command campaign."""
     from design.design_file import read_design
     from experiments.campaign.run_campaign import run_campaign
     from experiments.thesis.printed_choices import thesis_reference
@@ -221,7 +236,7 @@ def campaign(
 @click.argument("sweeps", nargs=-1, required=True, type=INPUT)
 @OUTPUT_FOLDER
 def additive_error(model: str, sweeps: tuple[Path, ...], output: Path) -> None:
-    """The additive error of SWEEPS against MODEL: additive_error.csv, additive_error_summary.csv."""
+    """Compute the additive error of SWEEPS against MODEL: additive_error.csv, additive_error_summary.csv."""
     from design.asked_model import asked_model
     from experiments.thesis.studies.additive_error import additive_error_tables
     from identification.sweeps.read_sweeps import read_sweeps

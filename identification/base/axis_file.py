@@ -111,53 +111,63 @@ class Key:
 
 
 KEYS = {
-    "input-name": Key("text", '"motor current"', "What the plant's input is called: what the drive is told to give."),
-    "input-unit": Key("text", '"A"', "Its unit."),
-    "output-name": Key("text", '"position"', "What the plant's output is called: what the sensor gives."),
-    "output-unit": Key("text", '"mm"', "Its unit."),
+    "input-name": Key(
+        "text", '"motor current"', "Name of the plant's input: the quantity that the drive is commanded."
+    ),
+    "input-unit": Key("text", '"A"', "Unit of the plant's input."),
+    "output-name": Key("text", '"position"', "Name of the plant's output: the quantity that the sensor measures."),
+    "output-unit": Key("text", '"mm"', "Unit of the plant's output."),
     "reference-hz": Key(
         "frequencies",
         "[0.5, 2]",
-        "Frequencies in Hz that the output follows without lasting error; 0 is a constant, as for a step.",
+        "Frequencies in Hz that the output follows without steady error; 0 is a constant, as for a step.",
     ),
     "amplitude": Key(
-        "numbers", "[1, 0.2]", "Of the reference at each of these frequencies, in the output's unit; at 0 its level."
+        "numbers",
+        "[1, 0.2]",
+        "Amplitude of the reference at each of these frequencies, in the output's unit; at 0 its level.",
     ),
     "phase": Key(
-        "numbers", "[0, 1.57]", "Of each, in radians: the reference is the sum of amplitude sin(omega t + phase)."
+        "numbers",
+        "[0, 1.57]",
+        "Phase at each of these frequencies, in radians: the reference is the sum of amplitude sin(omega t + phase).",
     ),
-    "offset": Key("number", "0.0", "Constant part of the reference, in the output's unit; 0 unless given."),
-    "slope": Key("number", "0.1", "Of a ramp that is added, in the output's unit a second."),
+    "offset": Key("number", "0.0", "Constant that is added to the reference, in the output's unit. Default: 0."),
+    "slope": Key("number", "0.1", "Slope of a ramp that is added to the reference, in the output's unit per second."),
     "reference": Key(
         "text",
         '"trajectory.csv"',
-        "The reference as a CSV with the columns time_s and reference, instead of amplitude, phase, offset and slope. "
-        "A name is counted from the folder of this file.",
+        "CSV file of the reference with the columns time_s and reference, instead of amplitude, phase, offset and "
+        "slope. The path is relative to the folder of this file.",
     ),
-    "limit": Key("limits", "[-10, 10]", "What the actuator gives at least and at most, in the input's unit."),
-    "rate-limit": Key("positive", "2000", "The most that the actuator changes in a second, in the input's unit."),
-    "rate": Key("positive", "2000", "Samples of the controller's computer in a second."),
-    "quantum": Key("size", "0.005", "Distance of two levels of the actuator, in the input's unit; 0 for none."),
+    "limit": Key("limits", "[-10, 10]", "Lower and upper saturation limit of the actuator, in the input's unit."),
+    "rate-limit": Key("positive", "2000", "Largest change of the actuator's output per second, in the input's unit."),
+    "rate": Key("positive", "2000", "Sampling rate of the controller's computer in Hz."),
+    "quantum": Key(
+        "size", "0.005", "Distance between two levels of the actuator, in the input's unit; 0 for no levels."
+    ),
     "robust-level": Key(
         "positive",
         "0.5",
-        "|W_a C S| stays at most this, below 1, where it is no longer proved that the loop is stable with every plant "
-        "within the bound W_a.",
+        "The design keeps |W_a C S| at or below this level. Below 1 the loop is stable with every plant within the "
+        "bound W_a that has as many poles in the right half plane.",
     ),
     "guarantee": Key(
         "global|robust|sector",
         '"robust"',
-        "What the anti-windup guarantees: global, whatever the control; robust, so for every plant within W_a; sector, "
-        "up to a control.",
+        "What the anti-windup guarantees. global: the windup ends for every control. robust: also for every plant "
+        "within W_a. sector: up to a largest control.",
     ),
-    "recovery": Key("positive", "0.5", "Most time in seconds for the anti-windup's slowest mode to fall to 1 %."),
+    "recovery": Key(
+        "positive", "0.5", "The slowest mode of the anti-windup falls to 1 % within this time, in seconds."
+    ),
 }
 """Every key, in the order of the file."""
 
 HEAD = """\
-# An axis: a plant between its actuator and its sensor, and what it has to do. Every line may be left out.
-# With --axis and this file's name, the commands take each line as the option of the same name; an option that is
-# given on the command line goes before."""
+# An axis: a plant between its actuator and its sensor, and its task. You may leave out any line.
+# With --axis and the name of this file, a command reads each line as the option of the same name. An option on the
+# command line replaces the line."""
 
 
 def read_axis(path: Path) -> dict[str, Any]:

@@ -43,7 +43,10 @@ AXIS = click.option(
     type=INPUT_FILE,
     is_eager=True,
     expose_value=False,
-    help="axis.toml whose keys are the defaults of the options of the same names; `antiwindup new` writes one.",
+    help=(
+        "axis.toml of your axis. Its keys are the defaults of the options with the same names; "
+        "`antiwindup new` writes one."
+    ),
 )
 
 

@@ -134,7 +134,7 @@ def _dead_time(result: FitResult, tests: Sequence[FrequencyResponse]) -> Iterato
         right = any(mode.zeta < 0 for mode in result.plant.zero_modes) or any(a < 0 for a in result.plant.real_zeros)
         stands_in = ", where a zero in the right half plane can stand in for one" if right else ""
         most = f"{result.nominal.intervals[1][-1]:.3g} s"
-        yield f"no dead time can be told from none; in this structure it is at most {most}{stands_in}"
+        yield f"the data show no dead time; in this structure it is at most {most}{stands_in}"
     turns = [same_turn(test.omega) for test in tests if test.record is None]
     if len(turns) == len(tests) and all(turns):
         turn = max(turn or 0.0 for turn in turns)

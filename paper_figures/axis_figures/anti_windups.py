@@ -25,6 +25,7 @@ UPSETS = {"start": ("a", "c"), "pulse": ("b", "d")}
 SHOWN = 0.5  # of the time that an upset counts
 FLOOR = 1e-3  # of the amplitude
 FEW = 10  # times the least control is the greatest, below which powers of ten are too few ticks
+MOST = 10.0  # of the amplitude
 ROOM = 1.25  # times the time until which a run is away that is shown
 HEADROOM = 1.15  # times the slowest recovery
 NEAR = 0.02  # of two dots, relative, that would hide each other
@@ -97,19 +98,20 @@ def comparison(tables: Mapping[str, pd.DataFrame], words: Mapping[str, str]) -> 
 
 def _distances(panel: Axes, runs: pd.DataFrame, begin: float, amplitude: float, words: Mapping[str, str]) -> None:
     time_s = runs["time_s"].to_numpy(float) - begin
-    last_s = 0.0
+    last_s, top = 0.0, 10 * SETTLED
     for run, said in words.items():
         if f"output_{run}" in runs:
             distance = (runs[f"output_{run}"] - runs["output_unsaturated"]).abs().to_numpy(float) / amplitude
             line = LINES[look_of(run)]
             points = panels.envelope(time_s, np.maximum(distance, FLOOR / 10))
             panel.plot(*points, **line, label=said, zorder=3 - line["linewidth"] / 10)
+            top = max(top, 2 * float(distance.max()))
             last_s = max(last_s, float(time_s[distance > FLOOR].max(initial=0.0)))
     if not last_s:
         _say(panel, "no run is away by as much as 0.1 %")
     panel.axhline(SETTLED, **LINES["saturation limits"])
-    panel.set(yscale="log", ylim=(FLOOR, 10.0), xlim=(0.0, min(time_s[-1], ROOM * last_s or time_s[-1])))
-    panel.set(xlabel="Time after the upset [s]", ylabel=r"$|y - y_\mathrm{unsaturated}|$ / amplitude")
+    panel.set(yscale="log", ylim=(FLOOR, min(top, MOST)), xlim=(0.0, min(time_s[-1], ROOM * last_s or time_s[-1])))
+    panel.set(xlabel="Time after the upset [s]", ylabel=r"$|y - y_\mathrm{unsaturated}|$ / amplitude [-]")
 
 
 def _measures(panel: Axes, table: pd.DataFrame, words: Mapping[str, str]) -> None:
@@ -131,7 +133,7 @@ def _measures(panel: Axes, table: pd.DataFrame, words: Mapping[str, str]) -> Non
         panel.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     panel.set(
-        xlabel=r"Greatest $|u|$ / limit",
+        xlabel=r"Greatest $|u|$ / limit [-]",
         ylabel="Recovery time [s]",
         ylim=(0, HEADROOM * slowest) if slowest > 0 else (-1, 1),
     )

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
@@ -21,11 +22,12 @@ TABLES: tuple[str, ...] = ("campaign", "campaign_summary", "campaign_distance")
 
 RUNS = ("corrected", "none")  # the thin lines upon the broad ones
 MEASURES = {
-    "a": ("peak_error", "Peak error, after a quarter of a period"),
-    "b": ("steady_error", "Steady error, of the last period"),
+    "a": ("peak_error", "Peak error after a quarter of a period"),
+    "b": ("steady_error", "Peak error of the last period"),
     "c": ("recovery_s", "Recovery time"),
 }
-STABLE = panels.band(LINES["family 4"])
+ENDS = ("least", "greatest")
+BEYOND = 10.0  # times the top of a panel: what is not in it
 DECADES = 9
 LOGARITHMIC = 100.0  # times the least error is the greatest, from where on the axis is
 UNSURE = 0.05  # a distribution function leaves its band as often as that
@@ -42,9 +44,9 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
         "so the shares are no probabilities of a real plant. (a) to (c) The share of all the plants whose numbers are "
         "no larger: the greatest error after a quarter of the reference's period, that of the last period, and the "
         "time after which the error stays within 1 % of the reference's amplitude. Runs that diverge or do not recover "
-        f"count among all, so a line may end below 1. {_outcomes(summary, signals.output_unit)} (d) The shares in each "
-        "tenth of the distance from the model, the largest |P_true - P|/|W_a|: broad grey, the loop is stable without "
-        f"limits ({_percent(only(summary, 'linear_stable'))} of all); coloured, the run recovers. With "
+        f"count among all, so a line may end below 1. {_outcomes(summary, signals.output_unit)} (d) The errors of (a), "
+        "from the least to the greatest, in each tenth of the distance from the model, the largest |P_true - P|/|W_a|. "
+        f"Without limits {_percent(only(summary, 'linear_stable'))} of the loops are stable. With "
         f"{number(100 * (1 - UNSURE))} % confidence more plants would move a line by no more than "
         f"{number(band(int(only(summary, 'plants'))), 2)}."
     )
@@ -105,9 +107,10 @@ def distributions(tables: Mapping[str, pd.DataFrame], words: Mapping[str, str], 
             panel.set_xticks([])
         panel.xaxis.set_minor_formatter(NullFormatter())
     axes["a"].legend(**panels.ABOVE, ncols=2)
-    _over_distance(axes["d"], tables["campaign_distance"], list(words))
-    for letter, panel in axes.items():
-        panel.set(ylabel={"b": "", "d": "Share that recovers"}.get(letter, "Share of the plants"), ylim=(-0.03, 1.03))
+    for letter in MEASURES:
+        axes[letter].set(ylabel="" if letter == "b" else "Share of the plants [-]", ylim=(-0.03, 1.03))
+    _over_distance(axes["d"], tables["campaign_distance"], list(words), axes["a"].get_xlim())
+    axes["d"].set(yscale=axes["a"].get_xscale(), ylabel=united("Peak error", unit))
     figure = axes["a"].get_figure(root=True)
     assert figure is not None
     return figure
@@ -132,13 +135,17 @@ def _steps(values: np.ndarray, share: np.ndarray, low: float, high: float) -> tu
     return corners, np.repeat(np.concatenate([[0.0], share[known]]), 2)
 
 
-def _over_distance(panel: Axes, table: pd.DataFrame, runs: Sequence[str]) -> None:
-    """The shares in each bin, as steps; a bin without a plant leaves a gap."""
+def _over_distance(panel: Axes, table: pd.DataFrame, runs: Sequence[str], view: tuple[float, float]) -> None:
+    """Bands from the least to the greatest peak error of the plants in each bin; one that diverges is beyond the view.
+
+    A bin without a plant leaves a gap.
+    """
     for order, run in enumerate(runs):
         rows = table[table["run"] == run]
         edges = np.append(rows["from"].to_numpy(float), rows["to"].to_numpy(float)[-1:])
-        panel.stairs(rows["recovered"], edges, baseline=None, **LINES[look_of(run)], zorder=3 + order)
-        if run == "none":
-            panel.stairs(rows["linear_stable"], edges, baseline=None, **STABLE, label="linear loop stable")
-    panel.set(xlabel="Distance from the model", xlim=(0, 1))
-    panel.legend(**panels.ABOVE)
+        beyond = np.where(rows["plants"] > 0, BEYOND * view[1], np.nan)
+        least, greatest = (rows[f"{end}_peak_error"].fillna(pd.Series(beyond, rows.index)) for end in ENDS)
+        line = LINES[look_of(run)]
+        fill = {"fill": True, "facecolor": to_rgba(line["color"], 0.3), "edgecolor": line["color"]}
+        panel.stairs(greatest, edges, baseline=least, **fill, linewidth=0.8, zorder=2 + order / 10)
+    panel.set(xlabel="Distance from the model [-]", xlim=(0, 1), ylim=view)

@@ -52,7 +52,8 @@ def _after(time_s: float) -> str:
 def draw(design: Design, tables: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the figure."""
     panel = figure(FULL_WIDTH, 2.8).subplots()
-    curves(panel, tables["limits_extended_summary"], "start_s", "rest", {f"tail_{run}": look_of(run) for run in RUNS})
+    tails = {f"tail_{run}": LINES[look_of(run)] for run in RUNS}
+    curves(panel, tables["limits_extended_summary"], "start_s", "rest", tails)
     panel.plot([], [], **FLOOR, label="best that was found")
     for run in RUNS:
         panel.plot([], [], **LINES[look_of(run)], label=KINDS[run])
@@ -69,8 +70,7 @@ def curves(
     table: pd.DataFrame,
     along: str,
     floor: str,
-    errors: Mapping[str, str],
-    marker: Mapping[str, Any] | None = None,
+    errors: Mapping[str, Mapping[str, Any]],
 ) -> None:
     """Draw a floor and errors of runs beside it, in as many decades as can be read.
 
@@ -83,9 +83,7 @@ def curves(
     floor
         The beginning of the two columns with the ends of what cannot be bettered.
     errors
-        Column -> entry of ``style.LINES``.
-    marker
-        Keywords of ``Axes.plot`` that are added to these.
+        Column -> keywords of ``Axes.plot``.
     """
     x = table[along]
     greatest = float(np.nanmax([table[column].max() for column in errors]))
@@ -97,7 +95,7 @@ def curves(
     panel.fill_between(x, bottom / 10**DECADES, lower, color=GREY, linewidth=0)
     panel.plot(x, upper, **FLOOR)
     for column, look in errors.items():
-        panel.plot(x, table[column], **(LINES[look] | dict(marker or {})))
+        panel.plot(x, table[column], **look)
     panel.set(yscale="log", ylim=(bottom, top))
     if len(x) > 1:
         seen = x[np.any([upper > bottom, *(~(table[column] <= bottom) for column in errors)], axis=0)]

@@ -141,7 +141,7 @@ def draw_distance(
     if touches_omega:
         at = np.array(touches_omega)
         panel.plot(hertz(at), decibel(np.abs(bound(1j * at))), **TOUCH, label="touches")
-    _leave_out_least(panel, distances)
+    leave_out_least(panel, distances)
     panel.set_ylabel(decibel_of("Distance", model.signals.gain_unit))
 
 
@@ -156,7 +156,7 @@ def draw_relative_distance(panel: Axes, model: IdentifiedModel, tests: Sequence[
     )
     relative = np.abs(model.additive_bound(1j * omega) / plant(1j * omega))
     panel.plot(hertz(omega), decibel(relative), **BOUND, label="$|W_a|/|P|$")
-    _leave_out_least(panel, ratios)
+    leave_out_least(panel, ratios)
     panel.set_ylabel("Relative distance [dB]")
 
 
@@ -250,7 +250,8 @@ def _thinned(omega: Real, values: Real) -> tuple[Real, Real]:
     return hertz(np.append(omega[::step], extremes)), np.append(values[::step], most)
 
 
-def _leave_out_least(panel: Axes, values: Sequence[Real]) -> None:
+def leave_out_least(panel: Axes, values: Sequence[Real]) -> None:
+    """End a panel above the least of the values in dB of its tests, single ones of which come near zero by chance."""
     found = np.concatenate([*values, np.zeros(0)])
     found = found[np.isfinite(found)]
     if found.size:

@@ -14,11 +14,12 @@ FEW = 100  # ratio of frequencies between which there are too few powers of ten
 
 
 def over_hertz(panel: Axes, low: float, high: float) -> None:
-    """Make a panel's axis logarithmic, from ``low`` to ``high`` in rad/s, and label it in Hz.
+    """Make a panel's axis logarithmic, from ``low`` to ``high`` in rad/s, and label it in Hz."""
+    over_decades(panel, low / tau, high / tau)
 
-    Below two decades, powers of ten would be too few ticks.
-    """
-    low, high = low / tau, high / tau
+
+def over_decades(panel: Axes, low: float, high: float) -> None:
+    """Make a panel's axis logarithmic, from ``low`` to ``high``; below two decades powers of ten are too few ticks."""
     if low == high:  # of a single line
         low, high = low / 2, high * 2
     panel.set_xscale("log")
@@ -28,7 +29,7 @@ def over_hertz(panel: Axes, low: float, high: float) -> None:
         panel.xaxis.set_major_locator(
             LogLocator(subs=(1, 2, 5)) if high > 5 * low else MaxNLocator(5, steps=[1, 2, 5, 10])
         )
-        panel.xaxis.set_major_formatter(FuncFormatter(lambda hertz, _: f"{hertz:g}"))
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def hertz(omega: Real) -> Real:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,11 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.transforms import IdentityTransform, Transform
 
 from paper_figures.look import style
+from paper_figures.look.control_axis import beyond_logarithmic
+from paper_figures.look.fast_swings import fast_stretches, swing_range
 
 MOST_POINTS = 3000
 """A line of more points than this is thinned to its envelope."""
@@ -34,6 +38,9 @@ Panels = dict[str, Axes]
 _DIVERGENT = 100.0  # a signal that exceeds its scale by more than this is not shown whole
 _SHOWN = 10.0  # but up to this many times its scale
 _MARGIN = 0.06
+_LINEAR = IdentityTransform()
+_THIN = 0.9  # width of the controller output upon the saturated input [pt]
+_EDGE = 0.5  # of the range of a line that swings too fast to be drawn
 
 
 @dataclass(frozen=True)
@@ -80,10 +87,9 @@ def lettered(width: float, height: float, layout: str, *, ratios: Sequence[float
     ----------
     width, height
         Size of the figure on the page [in].
-    layout
-        Which letter stands where, the rows divided by ``;``: in ``ac;bd;ee`` the last panel is as wide as two.
-    ratios
-        Relative heights of the rows; equal if not given.
+    layout, ratios
+        Which letter stands where, the rows divided by ``;``: in ``ac;bd;ee`` the last panel is as wide as two; and
+        the relative heights of the rows, equal if not given.
     """
     panels = style.figure(width, height).subplot_mosaic(layout, height_ratios=ratios)
     style.panel_letters(panels[letter] for letter in sorted(panels))
@@ -98,8 +104,8 @@ def finished(panels: Panels, *common: str) -> Figure:
     panels
         By letter.
     common
-        Letters of panels that get the same vertical view, such as ``ac``. A panel whose left neighbour has the
-        same view and name needs no labels there, nor one below which another has the same time axis.
+        Letters of panels that get the same vertical view, such as ``ac``. A panel needs no labels where its left
+        neighbour has the same view and name, or the one below it the same time axis.
     """
     for letters in common:
         ends = [panels[letter].get_ylim() for letter in letters]
@@ -134,7 +140,7 @@ def outputs(panel: Axes, table: pd.DataFrame, *runs: Run) -> None:
     reference = Trace(table["reference"], style.LINES["reference"], "$r$")
     traces = [Trace(table[f"output_{run.name}"], style.LINES[run.kind], run.symbol("$y$")) for run in runs]
     draw(panel, table["time_s"], [reference, *traces], scale(table["reference"]))
-    panel.set_ylabel("Output")
+    panel.set_ylabel("Output [unit of $y$]")
     key(panel)
 
 
@@ -142,7 +148,7 @@ def errors(panel: Axes, table: pd.DataFrame, *runs: Run) -> None:
     """Draw the tracking errors of the runs, with their key."""
     traces = [Trace(table[f"error_{run.name}"], style.LINES[run.kind], run.symbol("$e$")) for run in runs]
     draw(panel, table["time_s"], traces, scale(table["reference"]))
-    panel.set_ylabel("Error $e = r - y$")
+    panel.set_ylabel("Error [unit of $y$]")
     key(panel)
 
 
@@ -162,57 +168,62 @@ def controls(panel: Axes, table: pd.DataFrame, run: Run, limit: float, *signals:
     signals
         ``control``, ``saturated`` or both. The saturated input is a broad pale band, on which the line of the
         controller output lies wherever the two are the same.
+
+    Notes
+    -----
+    The axis is linear between the limits and logarithmic beyond them, so that they are seen however large u is.
     """
     line = style.LINES[run.kind]
+    if len(signals) > 1:
+        line = line | {"linewidth": _THIN}
     looks = {
         "control": (line, run.symbol("$u$")),
         "saturated": (band(line) if len(signals) > 1 else line, run.symbol(r"$\mathrm{sat}(u)$")),
     }
     traces = [Trace(table[f"{signal}_{run.name}"], *looks[signal]) for signal in signals]
+    if isfinite(limit):
+        beyond_logarithmic(panel, limit, _DIVERGENT * limit)
     draw(panel, table["time_s"], traces, limit)
     for end in (-limit, limit):
         panel.axhline(end, **style.LINES["saturation limits"], zorder=3)
-    panel.set_ylabel("Control")
+    panel.set_ylabel("Control [unit of $u$]")
     key(panel)
-
-
-def pade(panel: Axes, table: pd.DataFrame, run: Run) -> None:
-    """Draw what Pade approximations of the dead times change in the output of a run, with the key."""
-    line = style.LINES["second-order Pade"]
-    difference = pade_difference(table, run)
-    draw(panel, table["time_s"], [Trace(difference, line, r"$y - y_\mathrm{Pade}$")], scale(table["reference"]))
-    panel.set_ylabel("Difference")
-    key(panel)
-
-
-def pade_difference(table: pd.DataFrame, run: Run) -> pd.Series:
-    """Return the output of a run less that of the same run with Pade approximations."""
-    return table[f"output_{run.name}"] - table[f"output_{run.name}_pade"]
 
 
 def draw(panel: Axes, time_s: pd.Series, traces: Sequence[Trace], scale: float) -> None:
-    """Draw lines over time and choose the view.
+    """Draw lines over time, thinned to what the page can show, and choose the view.
 
     Parameters
     ----------
     panel
         Where to draw.
     time_s
-        Time [s].
+        Time [s]; all of it is shown, so give only the part to show.
     traces
-        The lines; where they meet, a thin one lies upon a broad one.
+        The lines; where they meet, a thin one lies upon a broad one. Where one swings faster than the page can show,
+        the range in which it swings is drawn in its place.
     scale
         What the signals are compared with, see :func:`view`.
     """
     signals = [trace.values.to_numpy(float) for trace in traces]
+    at = time_s.to_numpy(float)
+    panel.set_ylim(*view(signals, scale, panel.yaxis.get_transform()))
+    panel.set_xlim(at[0], at[-1])
+    low, high = panel.get_ylim()
     for trace, signal in zip(traces, signals, strict=True):
-        points = envelope(time_s.to_numpy(float), signal)
-        panel.plot(*points, **trace.line, label=trace.label, zorder=3 - trace.line["linewidth"] / 10)
-    panel.set_ylim(*view(signals, scale))
-    panel.set_xlim(time_s.iloc[0], time_s.iloc[-1])
+        layer = 3 - trace.line["linewidth"] / 10
+        slow = signal.copy()
+        for first, last in fast_stretches(panel, at, signal):
+            inside = (at >= first) & (at <= last)
+            slow[(at > first) & (at < last)] = np.nan
+            places, *ends = swing_range(at[inside], signal[inside])
+            color = trace.line["color"]
+            look = {"facecolor": paler(color, 0.6), "edgecolor": color, "linewidth": _EDGE, "zorder": layer}
+            panel.fill_between(places, *np.clip(ends, 2 * low - high, 2 * high - low), **look)
+        panel.plot(*envelope(at, slow), **trace.line, label=trace.label, zorder=layer)
 
 
-def view(signals: Sequence[np.ndarray], scale: float) -> tuple[float, float]:
+def view(signals: Sequence[np.ndarray], scale: float, axis: Transform = _LINEAR) -> tuple[float, float]:
     """Return the limits of a panel in which the signals can be read.
 
     Parameters
@@ -222,6 +233,8 @@ def view(signals: Sequence[np.ndarray], scale: float) -> tuple[float, float]:
     scale
         What the signals are compared with, such as the largest reference. They are shown whole unless they
         exceed it a hundredfold; then the panel shows up to ten times the scale, and the line leaves it.
+    axis
+        Of the scale of the axis, if it is not linear: the margin is one on the page.
     """
     values = np.concatenate([signal[np.isfinite(signal)] for signal in signals])
     if not len(values):
@@ -229,8 +242,10 @@ def view(signals: Sequence[np.ndarray], scale: float) -> tuple[float, float]:
     low, high = float(values.min()), float(values.max())
     if max(-low, high) > _DIVERGENT * scale > 0:
         low, high = max(low, -_SHOWN * scale), min(high, _SHOWN * scale)
+    low, high = axis.transform(np.array([low, high]))
     margin = _MARGIN * (high - low) or max(abs(high), 1.0)
-    return low - margin, high + margin
+    low, high = axis.inverted().transform(np.array([low - margin, high + margin]))
+    return float(low), float(high)
 
 
 def scale(reference: pd.Series) -> float:
@@ -257,7 +272,7 @@ def envelope(
     Parameters
     ----------
     x, y
-        The points, x ascending.
+        The points, x ascending, only those that are shown: what is left outside of the view is missing within it.
     most
         How many points to leave; fewer points than that stay as they are.
     along

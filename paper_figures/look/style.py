@@ -42,7 +42,7 @@ LINES: dict[str, dict[str, Any]] = {
     "static": {"color": "#4D4D4D", "linestyle": (0, (1, 1.2)), "linewidth": 1.4},
     "saturation limits": {"color": "#000000", "linestyle": (0, (1, 2)), "linewidth": 0.7},
     "bound": {"color": "#CC79A7", "linestyle": (0, (7, 2, 1.5, 2)), "linewidth": 1.6},
-    "second-order Pade": {"color": "#E69F00", "linestyle": (0, (2.5, 1.2)), "linewidth": 1.4},
+    "second-order Pade": {"color": "#E69F00", "linestyle": "-", "linewidth": 0.8},
     "family 1": {"color": "#4D4D4D", "linestyle": "-", "linewidth": 2.0},
     "family 2": {"color": "#4D4D4D", "linestyle": (0, (6, 2)), "linewidth": 1.0},
     "family 3": {"color": "#4D4D4D", "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 1.0},

@@ -97,24 +97,24 @@ def _limits(tracking: pd.DataFrame, best: pd.DataFrame | None, signals: Signals,
     ends, steady = ("lower_limit", "limit"), ("steady_least", "steady_greatest")
     (low, high), (least, greatest) = ([only(tracking, each) for each in pair] for pair in (ends, steady))
     takes = f"{number(least)} to {with_unit(greatest, unit)}" if least < greatest else with_unit(greatest, unit)
-    takes = f"in the steady state following the reference takes {takes}"
+    takes = f"in steady state the reference needs a control of {takes}"
     share = max(greatest / high, least / low) if low < 0 < high else math.nan
     if low < least and greatest < high:
         used = f", {number(100 * share, 2)} % of the way to the nearer one" if share > 0 else ""
         unsaturated = only(tracking, "linear_control")
         acts = of_run(tracking, "none", "last_saturation_s") != 0
-        reached = f"in the run the loop without limits asks for up to {with_unit(unsaturated, unit)}, so that they "
-        reached += "act" if acts else "never act"
+        reached = f"in the run the loop without limits asks for up to {with_unit(unsaturated, unit)}, so the "
+        reached += "actuator saturates" if acts else "actuator never saturates"
         if follows:
             return f"The limits {within} suffice for this reference: {takes}{used}; {reached}."
         asked = f"but from rest the loop asks for up to {with_unit(unsaturated, unit)}"
-        return f"The limits {within} would suffice: {takes}{used}; {asked}, and does not come to follow."
+        return f"The limits {within} would suffice: {takes}{used}; {asked}, and its output does not come to follow."
     forced = 0.0 if best is None else float(best["periodic_lower"].iloc[0])
     leaves = f": each leaves an error of {with_unit(forced, signals.output_unit)} or more" if forced > 0 else ""
     remedy = f" to {number(100 / share, 2)} % of its size, or widen the limits {number(share)} times"
     return (
         f"Make the reference smaller{'' if math.isnan(share) else remedy}: the limits {within} do NOT suffice: "
-        f"{takes}, so that no controller follows it{leaves}."
+        f"{takes}, so no controller follows it{leaves}."
     )
 
 
@@ -143,7 +143,7 @@ def _to_come(found: Found) -> Iterator[str]:
     if isinstance(found.axis, str):
         return
     if "design" not in found.designs:
-        yield f"{'This is the fit alone; designs' if found.axis is None else 'Designs'} and runs follow."
+        yield f"{'This page holds the fit alone; designs' if found.axis is None else 'Designs'} and runs follow."
         return
     rest = [said for name, said in DESIGNS.items() if name not in found.designs]
     if found.design("design") is not None:

@@ -72,7 +72,7 @@ def use_not(found: Found, signals: Signals) -> Iterator[str]:
             if _fails_first(times[run]) == place
         ]
         if gone and not math.isnan(times[str(best)][place]):
-            yield f"Do not use the anti-windup {_listed(gone)}, with which the loop does not recover {upset}."
+            yield f"Do not use the anti-windup {_listed(gone)}: with it the loop does not recover {upset}."
     yield from _without(str(best), found, signals)
 
 

@@ -198,26 +198,31 @@ def _count(structure: str, kind: str) -> int:
 def _intervals(fit: FitRecord) -> str:
     agreement, count = fit.agreement_of_tests, len(fit.tests)
     if agreement is None:
-        return "By the noise of the one test; how tests would differ is not known. The noise's column: standard errors."
+        return (
+            "They come from the noise of the one test; how tests would differ is not known. The column of noise holds "
+            "standard errors."
+        )
     chance = f"below {CERTAIN:g}" if agreement < CERTAIN else f"of {number(agreement, 1)}"
     chance = f"tests of one plant would differ as much with a probability {chance}"
     errors = "The columns of noise and scatter hold standard errors"
     if agreement < ONE_PLANT:
         return (
-            f"By Student's distribution of the scatter of {count} tests, as it is more than noise: {chance}. {errors}."
+            f"They come from the scatter of the {count} tests by Student's distribution, because the noise does not "
+            f"explain it: {chance}. {errors}."
         )
-    return f"By the noise, since the {count} tests differ by no more: {chance}. {errors}."
+    return f"They come from the noise, because the {count} tests differ by no more: {chance}. {errors}."
 
 
 def _residuals(fit: FitRecord) -> str:
     return (
-        f"From each test's own fit: median distance {_range([100 * test.median_distance for test in fit.tests])} % of "
-        f"the response; noise of {_range([100 * test.noise.relative for test in fit.tests])} % of the response and a "
+        "Between each test and its own fit: median distance "
+        f"{_range([100 * test.median_distance for test in fit.tests])} % of the response; noise of "
+        f"{_range([100 * test.noise.relative for test in fit.tests])} % of the response and a "
         f"floor of {_range([test.noise.floor for test in fit.tests])}; chi-square per degree of freedom "
         f"{_range([test.chi_square for test in fit.tests])}; correlation of neighbours "
         f"{_range([test.residual_correlation for test in fit.tests])}"
         + (
-            ": that is no noise but what the structure leaves, and the intervals are widened for it."
+            ". This is not noise: the structure does not explain it, and the intervals are widened for it."
             if any(fit.misfit)
             else "."
         )
@@ -235,16 +240,16 @@ def _checks(checks: Mapping[str, SubspaceCheck]) -> Iterator[str]:
     if changes:
         omega, zeta = (number(100 * max(of), 2) for of in zip(*changes, strict=True))
         yield (
-            f"N4SID, from nothing but the raw records, finds {len(changes)} of their {len(modes)} modes, omega within "
-            f"{omega} % and zeta within {zeta} % of the fit."
+            f"The method N4SID, which uses the raw records alone, finds {len(changes)} of their {len(modes)} modes, "
+            f"with omega within {omega} % and zeta within {zeta} % of the fit."
         )
     missed = [f"{mode.kind} of {number(mode.omega)} rad/s ({test})" for mode, test in modes if mode.found_omega is None]
     if missed:
-        yield f"N4SID finds no {_few(missed)}."
+        yield f"N4SID does not find the {_few(missed)}."
     for reason in dict.fromkeys(check.reason for check in checks.values()):
         if reason is not None:
             names = [test for test, check in checks.items() if check.reason == reason]
-            yield f"No answer by N4SID from {_few(names)}: {reason}."
+            yield f"N4SID gives no answer for {_few(names)}: {reason}."
 
 
 def cautions(model: IdentifiedModel) -> list[str]:
@@ -260,11 +265,11 @@ def _bound(bound: AdditiveBound, report: BoundReport) -> str:
         for touch in report.touches[:MOST_TOUCHES]
     ]
     return (
-        f"W_a bounds how far the plant may be from the model: {bound_text(bound)}, at no line below the distance of a "
-        "test from the model, nor between the lines, as far as was looked, below that of its own fit, "
-        f"{number(report.mean_excess)} times their envelope on average and "
-        f"{number(report.largest_excess)} times at most (no bound of this order gets below "
-        f"{lower_end(report.least_excess, 3)})."
+        f"W_a bounds how far the plant may be from the model: {bound_text(bound)}. At every line it is at least the "
+        "distance of each test from the model; between the lines, as far as was searched, it is at least the distance "
+        f"of each test's own fit. It is {number(report.mean_excess)} times the largest of these distances on average "
+        f"and {number(report.largest_excess)} times at most; no bound of this order gets below "
+        f"{lower_end(report.least_excess, 3)} times."
         + (f" It touches {', '.join(touches)}." if touches else "")
         + (f" {capitalised(str(report.outside))}." if report.outside else "")
     )

@@ -72,7 +72,7 @@ def record_of(plant: PlantModel, tests: list[FrequencyResponse], bound: Additive
         scatter=share(0.01) if len(tests) > 1 else None,
         agreement_of_tests=1e-9 if len(tests) > 1 else None,
         median_distances=(0.012,) * len(tests),
-        cautions=("no dead time can be told from none",) if plant.delay_s == 0 else (),
+        cautions=("the data show no dead time",) if plant.delay_s == 0 else (),
         tests=tuple(
             FittedTest(
                 name=test.name,

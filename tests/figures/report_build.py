@@ -99,8 +99,8 @@ class Page(HTMLParser):
         Of the ledger, each as a dictionary from the name of the column to the text.
     pictures
         Attributes of each <img>.
-    tables
-        Name and text of each embedded table, as it stands in the page.
+    tables, svgs
+        Name and text of each embedded table and picture, as it stands in the page.
     ids
         Every id.
     text
@@ -112,6 +112,7 @@ class Page(HTMLParser):
         self.rows: list[dict[str, str]] = []
         self.pictures: list[dict[str, str | None]] = []
         self.tables: list[tuple[str, str]] = []
+        self.svgs: list[tuple[str, str]] = []
         self.ids: list[str] = []
         self.text = ""
         self._inside: list[str] = []
@@ -128,8 +129,8 @@ class Page(HTMLParser):
             self.pictures.append(given)
         if tag in ("script", "style"):
             self._inside.append(tag)
-            if tag == "script" and given.get("class") == "table":
-                self.tables.append((given["data-table"] or "", ""))
+            if (held := self._held(given)) is not None:
+                held.append((given["data-table" if held is self.tables else "data-picture"] or "", ""))
         if tag == "tr" and "data-verdict" in given:
             self.rows.append({})
         if tag == "td":

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.axes import Axes
 
 from paper_figures.look.style import LINES
 from paper_figures.thesis.figures import fig_a_01, fig_a_02, fig_a_03
@@ -21,6 +20,7 @@ def trade_off() -> Tables:
         "popov_sector": [np.nan, np.nan, 0.875],
         "recovery_s": [0.25, 0.125, 1.75],
         "lasting_offset": [412.0, 533.0, 0.0],
+        "fastest": [62.5, 51.0, 49.0],
     }
     return {
         "trade_off": pd.DataFrame(rows, columns=["sector", "recovery_s", "f", "bandwidth"]),
@@ -39,10 +39,10 @@ def interpolation() -> Tables:
         )
     ranges = [("zeros", 0.125, 28.5), ("zeros", 512.0, 640.0), ("lagrange", np.nan, np.nan), ("poles", 301.0, 905.0)]
     summary = pd.DataFrame(ranges, columns=["method", "lowest", "highest"]).assign(a=6.5, delay_s=0.0125)
-    grid = [(x, y, int(x > 1)) for y in (0.01, 0.1, 1.0) for x in (0.5, 1.5, 2.5)]
+    grid = [(x, y, x - 1.25) for y in (0.01, 0.1, 1.0) for x in (0.5, 1.5, 2.5)]
     return {
         "interpolation": pd.concat(parts, ignore_index=True),
-        "interpolation_map": pd.DataFrame(grid, columns=["omega_delay", "a_delay", "stable"]),
+        "interpolation_map": pd.DataFrame(grid, columns=["omega_delay", "a_delay", "margin"]),
         "interpolation_summary": summary,
     }
 
@@ -68,16 +68,6 @@ def robustness() -> Tables:
     return {"robustness": pd.DataFrame(columns), "robustness_summary": pd.DataFrame(summary)}
 
 
-def drawn(axes: Axes, kind: str) -> list[tuple[np.ndarray, np.ndarray]]:
-    """The lines of an entry of style.LINES."""
-    wanted = LINES[kind]["color"].lower()
-    return [
-        (np.asarray(line.get_xdata(), dtype=float), np.asarray(line.get_ydata(), dtype=float))
-        for line in axes.lines
-        if str(line.get_color()).lower() == wanted
-    ]
-
-
 def test_the_trade_off() -> None:
     tables = trade_off()
     figure = fig_a_01.draw(tables)
@@ -85,12 +75,14 @@ def test_the_trade_off() -> None:
     curves = [line.get_ydata() for line in axes.lines[:2]]
     for k, curve in zip((0.75, 0.875), curves, strict=True):
         np.testing.assert_array_equal(curve, tables["trade_off"]["f"][tables["trade_off"]["sector"] == k])
-    assert drawn(axes, "thesis anti-windup")[0][1].tolist() == [1.625, 1.625]
-    x, y = drawn(axes, "corrected anti-windup")[0]
-    assert (x.tolist(), y.tolist()) == ([1.75], [0.0425])
+    points = [(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in axes.lines[2:]]  # type: ignore[index]
+    assert points == [(0.25, 1.625), (0.125, 1.375), (1.75, 0.0425)]
+    assert [line.get_fillstyle() for line in axes.lines[2:]] == ["none", "none", "full"]
     caption = fig_a_01.caption(tables)
-    for said in ("55 rad/s", "0.02 for k = 0.75; 0.04 for k = 0.875", "f = 0.0425", "f = 1.62", "1.38", "412", "533"):
+    for said in ("faster than 55 rad/s", "f = 0.0425", "f = 1.62, whose fastest pole, 62.5 rad/s, is NOT", "f = 1.38"):
         assert said in caption
+    tables["trade_off_summary"]["fastest"] = 54.0
+    assert "54 rad/s, is within that bandwidth" in fig_a_01.caption(tables)
 
 
 def test_the_designs_of_q() -> None:
@@ -104,11 +96,15 @@ def test_the_designs_of_q() -> None:
         assert str(thin.get_color()).lower() == LINES[kind]["color"].lower()
         np.testing.assert_array_equal(thin.get_ydata(), part["sensitivity"])
         np.testing.assert_array_equal(works.get_ydata(), part["sensitivity"].where(part["works"] == 1))
-    assert right.lines[0].get_ydata()[0] == pytest.approx(6.5 * 0.0125)  # type: ignore[index]
+    (line,) = (line for line in right.lines if len(line.get_ydata()))  # type: ignore[arg-type]
+    assert line.get_ydata()[0] == pytest.approx(6.5 * 0.0125)  # type: ignore[index]
+    (stable,) = right.collections
+    corners = np.concatenate([path.vertices for path in stable.get_paths()])
+    assert corners.min(axis=0).tolist() == pytest.approx([1.25, 0.01])  # where the margin is zero, between the columns
+    assert corners.max(axis=0).tolist() == [2.5, 1.0]
     caption = fig_a_02.caption(tables)
-    assert "zeros of Q from 0.125 to 28.5 rad/s and from 512 to 640 rad/s; Lagrange interpolation nowhere;" in caption
-    assert "poles of Q from 301 to 905 rad/s" in caption
-    assert "a = 6.5 rad/s and T_d = 12.5 ms" in caption
+    assert "In rad/s: zeros of Q, 0.125 to 28.5 and 512 to 640; Lagrange, nowhere; poles of Q, 301 to 905." in caption
+    assert "a = 6.5 rad/s, T_d = 12.5 ms" in caption
 
 
 def test_the_robustness() -> None:
@@ -116,19 +112,22 @@ def test_the_robustness() -> None:
     figure = fig_a_03.draw(tables)
     left, right = figure.axes
     table = tables["robustness"]
-    for name, (kind, _) in fig_a_03.KINDS.items():
-        np.testing.assert_array_equal(drawn(left, kind)[0][1], table[f"robustness_{name}"])
-        np.testing.assert_array_equal(drawn(right, kind)[0][1], table[f"sensitivity_{name}"])
-    np.testing.assert_array_equal(drawn(left, "reference")[0][1], table["floor"])
+    for k, name in enumerate(fig_a_03.KINDS):
+        np.testing.assert_array_equal(left.lines[k].get_ydata(), table[f"robustness_{name}"])
+        np.testing.assert_array_equal(right.lines[k].get_ydata(), table[f"sensitivity_{name}"])
+    for panel in (left, right):  # the redesign cannot hide the thesis's line
+        thesis, redesign = panel.lines[:2]
+        assert thesis.get_zorder() > redesign.get_zorder()
+        assert thesis.get_linewidth() < redesign.get_linewidth() / 2
+    np.testing.assert_array_equal(left.lines[2].get_ydata(), table["floor"])
     caption = fig_a_03.caption(tables)
     for said in (
         "reaches 7.75 at 123 rad/s",
-        "conditions, 0.812",
+        "redesign reaches 0.812",
         "0.00275",
-        "is 0.938 with the one and 0.688 with the other",
+        "is 0.938 (thesis) and 0.688 (redesign)",
         "0.155 s and 0.144 s",
-        "guarantees nothing",
-        "0.144 s",
+        "the condition does NOT hold",
     ):
         assert said in caption
 
@@ -136,4 +135,4 @@ def test_the_robustness() -> None:
 def test_a_design_that_is_robust_already_is_said_to_be() -> None:
     tables = robustness()
     tables["robustness_summary"].loc[0, "peak"] = 0.5
-    assert "stable already" in fig_a_03.caption(tables)
+    assert "the condition holds" in fig_a_03.caption(tables)

@@ -158,9 +158,9 @@ level over valve current: plant with
 SYNTHETIC DATA: 2 of 2 tests
 Do: Use the controller of design.json with the anti-windup 'corrected'
 stays below 17.2 mA; under this reference it reached 12.8 mA, no more.
-The limits +-6.5 mA suffice for this reference: in the steady state following the reference takes
+The limits +-6.5 mA suffice for this reference: in steady state the reference needs a control of
 -4.25 to 4.25 mA, 65 % of the way to the nearer one; in the run
-the loop without limits asks for up to 9.5 mA, so that they act.
+the loop without limits asks for up to 9.5 mA, so the actuator saturates.
 by the method 'matched' at 100 Hz or more
 Avoid: Do not leave the anti-windup out: without it an error of 0.875 cm is left at the end of the run, with
 Do not use Tustin's rule below 400 Hz: at 200 Hz the steady error is 0.125 cm.
@@ -170,11 +170,12 @@ gain K [cm/(mA s)] 2.000 1.960 to 2.040 0.006 0.02
 0.0500 0.0490 to 0.0510
 2 tests in day_0.csv, day_1.csv; 120 lines from 5 to 400 rad/s
 Its BIC is 94 better than that of the next best, 1 integrator.
-Student's distribution of the scatter of 2 tests
+the scatter of the 2 tests by Student's distribution
 probability below 1e-06
 noise of 1.2 % of the response
 W_a = 0.3 (1 + s/40) / (1 + 2 0.2 s/60 + (s/60)^2)
-3.25 times their envelope on average and 12.5 times at most (no bound of this order gets below 11.7)
+It is 3.25 times the largest of these distances on average and 12.5 times at most; no bound of this order gets
+below 11.7 times
 It touches day_0.csv at 55.5 rad/s
 run last at a limit [s] most asked for [mA]
 without anti-windup 3.12 12.5 0.875 1.5
@@ -199,7 +200,7 @@ CASES = {
         {"tracking": tracking(steady=8.125)},
         "Do",
         "Make the reference smaller to 80 % of its size, or widen the limits 1.25 times: the limits +-6.5 mA do NOT "
-        "suffice: in the steady state following the reference takes -8.12 to 8.12 mA, so that no controller "
+        "suffice: in steady state the reference needs a control of -8.12 to 8.12 mA, so no controller "
         "follows it: each leaves an error of 0.375 cm or more.",
     ),
     "limits above 0": (
@@ -210,7 +211,7 @@ CASES = {
     "limits that are never reached": (
         {"tracking": tracking(last=0.0)},
         "Do",
-        "asks for up to 9.5 mA, so that they never act.",
+        "asks for up to 9.5 mA, so the actuator never saturates.",
     ),
     "an anti-windup that does harm": (
         {"compare": compared(1.25, 2.5)},
@@ -267,8 +268,8 @@ def test_errors_of_rounding_are_not_compared():
 def test_a_reference_that_takes_no_steady_control_is_said_to_ask_for_what_the_run_did():
     said = advised(found_of(tracking=tracking(steady=0.0, last=0.0)))["Do"]
     assert (
-        "in the steady state following the reference takes 0 mA; in the run the loop without limits asks for up to "
-        "9.5 mA, so that they never act." in said
+        "in steady state the reference needs a control of 0 mA; in the run the loop without limits asks for up to "
+        "9.5 mA, so the actuator never saturates." in said
     )
 
 
@@ -336,7 +337,7 @@ def test_a_delay_free_design_is_judged_with_the_dead_time(delay_free_design, imp
 def test_the_page_says_what_is_still_to_come():
     alone = advised(Found())
     assert set(alone) == {"Not yet on this page"}
-    assert alone["Not yet on this page"] == "This is the fit alone; designs and runs follow."
+    assert alone["Not yet on this page"] == "This page holds the fit alone; designs and runs follow."
     assert advised(Found(AXIS))["Not yet on this page"] == "Designs and runs follow."
     part = {name: table for name, table in tables().items() if name not in ("rates", "campaign")}
     said = advised(Found(AXIS, dict.fromkeys(("design", "design_delay_free"), design_of("extended")), part))
@@ -368,7 +369,7 @@ def test_what_the_fit_leaves_is_said():
         misfit=fit.noise,
         cautions=(
             "a median distance of 25 % is more than noise leaves",
-            "no dead time can be told from none",
+            "the data show no dead time",
             f"{tests[0].name}: the plant misses the line at 2 Hz",
         ),
         agreement_of_tests=0.5,
@@ -384,11 +385,11 @@ def test_what_the_fit_leaves_is_said():
         "differ by no more: tests of one plant would differ as much with a probability of 0.5",
         "No other structure was tried. The deviance is divided by 19.5",
         "A median distance of 25 % is more than noise leaves.",
-        f"No dead time can be told from none. {tests[0].name}: the plant misses",
+        f"The data show no dead time. {tests[0].name}: the plant misses",
         "the intervals are widened for it",
-        "finds 2 of their 4 modes, omega within 2.5 % and zeta within 50 % of the fit.",
-        "N4SID finds no pole of 20 rad/s (day_0.csv), pole of 20 rad/s (day_1.csv).",
-        "No answer by N4SID from day_2.csv: too short.",
+        "finds 2 of their 4 modes, with omega within 2.5 % and zeta within 50 % of the fit.",
+        "N4SID does not find the pole of 20 rad/s (day_0.csv), pole of 20 rad/s (day_1.csv).",
+        "N4SID gives no answer for day_2.csv: too short.",
     ):
         assert part in text, part
 
@@ -496,10 +497,10 @@ def test_the_anti_windup_is_the_one_whose_run_recovers():
     found = found_of(compare=compared(NAN, NAN, static=1.5, observer=2.5))
     said = advised(found)
     assert "'static' (--anti-windup static): from rest it recovers after 1.5 s" in said["Do"]
-    assert "Do not use the anti-windup 'corrected', with which the loop does not recover from rest." in said["Avoid"]
+    assert "Do not use the anti-windup 'corrected': with it the loop does not recover from rest." in said["Avoid"]
     nothing = advised(found_of(compare=compared(NAN, NAN, enough=4.0)))["Do"]
     assert "With a reference 4 times smaller, or limits 4 times wider, one does" in nothing
-    assert "would suffice: in the steady state" in nothing
+    assert "would suffice: in steady state" in nothing
     assert "Run it on a computer" not in nothing
 
 

@@ -176,5 +176,5 @@ def test_every_target_is_in_the_help() -> None:
         "fuzz",
         "faults",
     ]
-    targets += ["audit", "lint", "clean"]
+    targets += ["audit", "docs", "lint", "release-check", "clean"]
     assert all(f"\n{name} " in f"\n{text}" for name in targets)

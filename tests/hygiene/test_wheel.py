@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
@@ -20,6 +21,7 @@ from experiments.__main__ import main
 
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("identification", "design", "experiments", "paper_figures", "antiwindup", "data/thesis")
+VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 BUILD = (
     "import sys; from setuptools import build_meta; print('built', build_meta.build_wheel(sys.argv[1]))"  # as pip does
 )
@@ -64,8 +66,10 @@ def test_the_wheel_works_from_any_folder(tree: Path, tmp_path: Path) -> None:
     (folder / "data").mkdir(parents=True)
     (folder / "data" / "mine.csv").touch()
     command = environment / "bin" / "antiwindup"
-    assert run(command, "--version", cwd=folder).stdout == "antiwindup, version 0.1.0\n"
-    assert run(python, "-m", "antiwindup", "--version", cwd=folder).stdout == "python -m antiwindup, version 0.1.0\n"
+    assert run(command, "--version", cwd=folder).stdout == f"antiwindup, version {VERSION}\n"
+    assert (
+        run(python, "-m", "antiwindup", "--version", cwd=folder).stdout == f"python -m antiwindup, version {VERSION}\n"
+    )
     output = folder / "design.json"
     done = run(command, "design", "extended", "implied", *ASKED, "--output", output, cwd=folder)
     assert done.returncode == 0, done.stderr

@@ -86,6 +86,11 @@ def test_the_shares_over_the_distance(campaign: Path) -> None:
     np.testing.assert_array_equal(none["linear_stable"], [1, 1, 1, 1, 1, 1, 1, 0.5, 0, 0])
     np.testing.assert_array_equal(none["diverged"], [0, 0.25] * 5)
     np.testing.assert_array_equal(none["recovered"], [1, 0.75] * 5)
+    np.testing.assert_array_equal(none["least_peak_error"], 50.0 + 4 * np.arange(10))
+    np.testing.assert_array_equal(
+        none["greatest_peak_error"], np.where(np.arange(10) % 2, np.nan, none["least_peak_error"] + 3)
+    )
+    np.testing.assert_array_equal(thesis["greatest_peak_error"], 50.0 + 2 * (4 * np.arange(10) + 3))
     assert (thesis[["diverged", "recovered"]] == 0).all(axis=None)
 
 

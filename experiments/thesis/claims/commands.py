@@ -13,10 +13,10 @@ from identification.base.path_types import INPUT_FILE, OUTPUT_FILE, OUTPUT_FOLDE
 
 
 @click.command("claims")
-@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder for claims.csv.")
-@click.option("--page", type=OUTPUT_FILE, help="Markdown file to write the page to.")
+@click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write claims.csv to.")
+@click.option("--page", type=OUTPUT_FILE, help="Write the page to this Markdown file.")
 def claims_command(output: Path, page: Path | None) -> None:
-    """What the thesis claims, computed again: claims.csv, and a page to read."""
+    """Compute every claim of the thesis again: claims.csv, and a page to read."""
     from experiments.thesis.claims.coverage import EXCEPTIONS, RECORD, quotes_sha256, read_exceptions, read_record
     from experiments.thesis.claims.ledger import LEDGER, read_ledger, recompute
     from experiments.thesis.claims.page import claims_page
@@ -38,9 +38,11 @@ def claims_command(output: Path, page: Path | None) -> None:
 
 @click.command("coverage")
 @click.argument("text", type=INPUT_FILE)
-@click.option("--record", type=OUTPUT_FILE, help="JSON file to keep the counts in.")
+@click.option("--record", type=OUTPUT_FILE, help="Write the counts to this JSON file.")
 def coverage_command(text: Path, record: Path | None) -> None:
-    """List the numbers in the thesis's TEXT that no claim quotes; exit status 1 if there is one, or a quote is not."""
+    """List the numbers in the thesis's TEXT that no claim quotes.
+
+    The exit status is 1 if there is one, or if a quote is not in TEXT."""
     from experiments.thesis.claims.coverage import (
         EXCEPTIONS,
         LEFT,
@@ -69,9 +71,9 @@ def coverage_command(text: Path, record: Path | None) -> None:
 
 
 @click.command("equations")
-@click.option("--page", type=OUTPUT_FILE, required=True, help="Markdown file to write the page to.")
+@click.option("--page", type=OUTPUT_FILE, required=True, help="Write the page to this Markdown file.")
 def equations_command(page: Path) -> None:
-    """Each equation, lemma, theorem, table and figure of the thesis with its function and its test, as a page."""
+    """Write a page with each equation, lemma, theorem, table and figure, its function and its test."""
     from experiments.thesis.claims.equations_page import EQUATIONS, equations_page, read_equations
 
     table = read_equations()

@@ -46,8 +46,8 @@ def interpolation_tables(design: Design) -> dict[str, pd.DataFrame]:
         ``interpolation``: omega (rad/s), method, stable, outer (C_0 has no zero in the closed right half plane, the
         proviso of (3.19)), sensitivity (||S||, empty where Q is not stable), works (all three, ||S|| <= 2).
         ``interpolation_summary``: method, lowest and highest omega of each range in which it works (empty: nowhere),
-        a, delay_s. ``interpolation_map``: omega_delay, a_delay, stable: whether the poles design gives a stable Q
-        depends on omega T_d and a T_d only.
+        a, delay_s. ``interpolation_map``: omega_delay, a_delay, margin: the poles design gives a stable Q where
+        it is positive, which depends on omega T_d and a T_d only.
     """
     a, delay_s = design.free.a, design.plant.delay_s
     top = max(100 * a, 3 * math.pi / delay_s if delay_s else 0.0)
@@ -65,15 +65,12 @@ def interpolation_tables(design: Design) -> dict[str, pd.DataFrame]:
         ends = [(part["omega"].iloc[first], part["omega"].iloc[last - 1]) for first, last in edges.reshape(-1, 2)]
         for lowest, highest in ends or [(np.nan, np.nan)]:
             summary.append({"method": name, "lowest": lowest, "highest": highest, "a": a, "delay_s": delay_s})
-    omega_delay, a_delay = (
-        each.ravel() for each in np.meshgrid(np.geomspace(1e-2, 20, 151), np.geomspace(1e-3, 10, 61))
-    )
-    stable = _poles_are_stable(omega_delay, a_delay)
+    omega_delay, a_delay = (each.ravel() for each in np.meshgrid(np.linspace(0.1, 20, 151), np.geomspace(1e-3, 10, 61)))
     return {
         "interpolation": table,
         "interpolation_summary": pd.DataFrame(summary),
         "interpolation_map": pd.DataFrame(
-            {"omega_delay": omega_delay, "a_delay": a_delay, "stable": stable.astype(int)}
+            {"omega_delay": omega_delay, "a_delay": a_delay, "margin": _poles_margin(omega_delay, a_delay)}
         ),
     }
 
@@ -92,7 +89,10 @@ def _judge(method: Callable[[Conditions], StableFunction], omega: float, delay_s
     return {"stable": 1, "outer": int(outer), "sensitivity": sensitivity, "works": int(works)}
 
 
-def _poles_are_stable(omega: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """Whether 1/Q = c_2 s^2 + c_1 s + c_0 through the conditions, with T_d = 1, has all coefficients positive."""
+def _poles_margin(omega: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """Positive where 1/Q = c_2 s^2 + c_1 s + c_0 through the conditions, with T_d = 1, has all coefficients positive.
+
+    It is the lesser of c_1 and c_2 over |1/Q|, and so smooth across the boundary, which a contour then finds.
+    """
     inverse, c_0 = 1 / wanted_at(omega, 1.0, a), 1 / (a * (1 + a))
-    return np.asarray((inverse.imag > 0) & (inverse.real < c_0))
+    return np.asarray(np.minimum(inverse.imag, c_0 - inverse.real) / (np.abs(inverse) + c_0))

@@ -17,7 +17,8 @@ from design.design_file import Design
 from identification.base.errors import InputError
 
 SECTORS = (0.9, 0.95, 0.99, 1.0)  # 1: positive real
-RECOVERIES = 9  # recovery times, from the fastest that the bandwidth leaves room for
+RECOVERIES = 12  # recovery times, from the fastest that the bandwidth leaves room for
+CLOSEST = 0.1  # of the fastest, from it to the next one: f bends there
 
 
 def trade_off_tables(design: Design, tick: Callable[[], object] = lambda: None) -> dict[str, pd.DataFrame]:
@@ -35,13 +36,14 @@ def trade_off_tables(design: Design, tick: Callable[[], object] = lambda: None) 
     dict
         ``trade_off``: sector, recovery_s, f (empty where nothing meets the sector), bandwidth. ``trade_off_summary``: a
         row for thesis, least (the best found of (2.23) within the bandwidth), corrected: f, popov_sector (empty: any),
-        recovery_s, lasting_offset (of a windup of 1; empty: it grows).
+        recovery_s, lasting_offset (of a windup of 1; empty: it grows), fastest (rad/s, of the poles of theta1~).
     """
     bandwidth, own = design.corrected.bandwidth, design.corrected.judgement.recovery_s
     bound = design.additive_bound
     unstable = plant_block(design.plant).unstable_poles
     rows = []
-    for recovery_s in np.geomspace(3 * np.log(1 / SETTLED) / bandwidth, 5 * own, RECOVERIES):
+    fastest = 3 * np.log(1 / SETTLED) / bandwidth
+    for recovery_s in fastest + np.append(0.0, np.geomspace(CLOSEST * fastest, 5 * own - fastest, RECOVERIES - 1)):
         for sector in SECTORS:
             try:
                 condition = Sector(sector) if sector < 1 else PositiveReal()
@@ -56,8 +58,11 @@ def trade_off_tables(design: Design, tick: Callable[[], object] = lambda: None) 
         "least": second_order(alpha, beta, gamma),
         "corrected": design.compensator("corrected"),
     }
-    summary = [{"run": name} | vars(judge(design.plant, bound, kind)) for name, kind in kinds.items()]
-    columns = ["run", "f", "popov_sector", "recovery_s", "lasting_offset"]
+    summary = [
+        {"run": name, "fastest": max(map(abs, kind.one_plus.poles))} | vars(judge(design.plant, bound, kind))
+        for name, kind in kinds.items()
+    ]
+    columns = ["run", "f", "popov_sector", "recovery_s", "lasting_offset", "fastest"]
     return {
         "trade_off": pd.DataFrame(rows, columns=["sector", "recovery_s", "f", "bandwidth"]),
         "trade_off_summary": pd.DataFrame(summary)[columns].astype({"popov_sector": float, "lasting_offset": float}),

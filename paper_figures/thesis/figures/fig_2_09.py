@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.legend_handler import HandlerTuple
+from scipy.interpolate import CubicSpline
 
+from identification.base.arrays import Real
 from paper_figures.look import panels, style
+from paper_figures.look.bode import BOUND, MEASURED, MODEL, TOUCH, decibel, leave_out_least
 from paper_figures.look.captions import number, only
-from paper_figures.look.style import FULL_WIDTH, LINES, styled
+from paper_figures.look.frequency_axis import over_decades
+from paper_figures.look.style import FULL_WIDTH, styled
 
 TABLES: tuple[str, ...] = ("additive_error", "additive_error_summary")
-
-MARKERS = "osD^v<>"
-MOST_MARKERS = 500
 
 
 def caption(tables: Mapping[str, pd.DataFrame]) -> str:
@@ -27,52 +26,45 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     verdict = "at every line" if not above else f"but for {above} lines"
     synthetic = int(only(summary, "synthetic_tests"))
     origin = (
-        f" {synthetic} of the tests are SYNTHETIC, made by a program: they show that the method works and are no "
-        "evidence about any hardware. (The thesis's own records are not published.)"
+        f" {synthetic} of the tests are SYNTHETIC: a program made them. They show that the method works, and say "
+        "nothing about hardware. The thesis does not publish its own records."
     )
     return (
         f"Additive error |P - P_test| of {only(summary, 'tests'):.0f} tests at {only(summary, 'lines'):.0f} spectral "
-        "lines, the bound |W_a| of Eq. (2.21) and, for scale, |P| (thesis Fig. 2.9). The error stays below the bound "
-        f"{verdict}; the largest ratio of the two is {number(only(summary, 'largest_ratio'))}, at omega = "
-        f"{number(only(summary, 'largest_ratio_omega'))} rad/s. Where lines stand closer than markers, the smallest "
-        f"and the largest error of each test are drawn.{origin if synthetic else ''}"
+        "lines, the bound |W_a| of Eq. (2.21), and |P| for scale (thesis Fig. 2.9). The error stays below the bound "
+        f"{verdict}. The largest ratio of the two is {number(only(summary, 'largest_ratio'))}, at omega = "
+        f"{number(only(summary, 'largest_ratio_omega'))} rad/s (ring).{origin if synthetic else ''}"
     )
 
 
 @styled()
 def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
-    """Return the figure, on logarithmic axes."""
+    """Return the figure, in dB over the frequency in rad/s."""
     table = tables["additive_error"]
     figure = style.figure(FULL_WIDTH, 3.4)
     panel = figure.subplots()
-    tests = sorted(table["test"].unique())
-    markers = []
-    for order, test in enumerate(tests):
-        rows = table[table["test"] == test].sort_values("omega")
-        markers += panel.plot(*_thinned(rows, "error", MOST_MARKERS), **_marker(order, len(tests)))
+    errors = []
+    for order, (_, rows) in enumerate(table.sort_values("omega").groupby("test")):
+        omega, error = (rows[name].to_numpy(float) for name in ("omega", "error"))
+        omega, error = panels.envelope(omega, error, along=np.log(omega))
+        errors.append(decibel(error))
+        panel.plot(omega, errors[-1], **MEASURED, label=None if order else r"$|P - P_\mathrm{test}|$")
     common = table.sort_values("omega").drop_duplicates("omega")
-    (model,) = panel.plot(*_thinned(common, "plant"), **LINES["model"] | {"linewidth": 0.6})
-    (bound,) = panel.plot(*_thinned(common, "bound"), **LINES["bound"])
-    panel.set(xscale="log", yscale="log", xlabel=r"$\omega$ [rad/s]", ylabel="Magnitude")
-    panel.set_xlim(table["omega"].min(), table["omega"].max())
-    shown = tuple(markers[:3])
-    span = f"test {tests[0]}" if len(tests) == 1 else f"tests {tests[0]} to {tests[-1]}"
-    panel.legend(
-        [shown, bound, model],
-        [rf"$|P - P_\mathrm{{test}}|$, {span}", r"$|W_a|$", "$|P|$"],
-        handler_map={tuple: HandlerTuple(ndivide=None, pad=0.3)},
-        **panels.ABOVE,
-        ncols=3,
-    )
+    omega, bound, plant = (common[name].to_numpy(float) for name in ("omega", "bound", "plant"))
+    panel.plot(omega, decibel(bound), **BOUND, label="$|W_a|$")
+    nearest = table.iloc[int((table["error"] / table["bound"]).to_numpy().argmax())]
+    panel.plot(nearest["omega"], decibel(nearest["error"]), **TOUCH, label="nearest to the bound")
+    panel.plot(*_smooth(omega, plant), **MODEL, label="$|P|$")
+    leave_out_least(panel, errors)
+    over_decades(panel, float(omega[0]), float(omega[-1]))
+    panel.set(xlabel=r"$\omega$ [rad/s]", ylabel="Magnitude [dB]")
+    panel.legend(ncols=4, markerscale=1.5, **panels.ABOVE)
     return figure
 
 
-def _thinned(rows: pd.DataFrame, column: str, most: int = panels.MOST_POINTS) -> tuple[np.ndarray, np.ndarray]:
-    omega, values = (rows[name].to_numpy(float) for name in ("omega", column))
-    return panels.envelope(omega, values, most, along=np.log(omega))
-
-
-def _marker(order: int, tests: int) -> dict[str, Any]:
-    """Return the style of a test: a shape of its own, and paler from the first to the last."""
-    color = panels.paler(LINES["measured"]["color"], 0.6 * order / max(tests - 1, 1))
-    return LINES["measured"] | {"color": color, "marker": MARKERS[order % len(MARKERS)], "markeredgewidth": 0}
+def _smooth(omega: Real, plant: Real) -> tuple[Real, Real]:
+    """|P| in dB, with points between the spectral lines: |P|^2 is a smooth function, through a notch too."""
+    if omega.size < 2:
+        return omega, decibel(plant)
+    grid = np.unique([*omega, *np.geomspace(omega[0], omega[-1], panels.MOST_POINTS)])
+    return grid, decibel(np.maximum(CubicSpline(omega, plant**2)(grid), 0.0)) / 2

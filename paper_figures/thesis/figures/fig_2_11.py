@@ -28,9 +28,8 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     beta = fraction(only(summary, "beta"))
     return (
         f"Fig. 2.10 enlarged around the least f for beta = {beta} s (thesis Fig. 2.11): f = {f} at gamma = {gamma}. "
-        "The text has its least f at gamma = 97 and beta = 1/40 and prints no value of f. The choice is the best of "
-        f"a coarse grid of beta only: over a continuous beta, f falls to {f_best} at beta = {beta_best} s and gamma = "
-        f"{gamma_best}."
+        "The text has its least f at gamma = 97 and beta = 1/40 and prints no value of f. Our beta is the best of a "
+        f"coarse grid. Over a continuous beta, f falls to {f_best} at beta = {beta_best} s and gamma = {gamma_best}."
     )
 
 
@@ -53,6 +52,6 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
         markersize=4.5,
         label=rf"$\gamma = {number(gamma, 4)}$, $f = {number(f, 4)}$",
     )
-    panel.set(xlabel=r"$\gamma$", ylabel=rf"$f(\gamma)$, $\beta = {fraction(beta)}$ s")
+    panel.set(xlabel=r"$\gamma$ [-]", ylabel=rf"$f(\gamma)$ [unit of $W_a$], $\beta$ = {fraction(beta)} s")
     panel.legend(**ABOVE)
     return figure

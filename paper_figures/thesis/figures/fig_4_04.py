@@ -8,10 +8,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures.look import panels
-from paper_figures.look.captions import largest, last_saturated, of_run, promises
+from paper_figures.look.captions import largest, last_saturated, of_run
 from paper_figures.look.panels import CORRECTED, THESIS
 from paper_figures.look.style import FULL_WIDTH, styled
-from paper_figures.thesis.figures.shared_chapter_4 import beginning, chosen_limit
+from paper_figures.thesis.figures.shared_chapter_4 import beginning, few_cycles, limits, until
 
 TABLES: tuple[str, ...] = ("extended", "extended_summary")
 
@@ -25,22 +25,22 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
         for run in ("thesis", "corrected")
     )
     return (
-        "Controller output and plant input in the runs of Fig. 4.3 (thesis Fig. 4.4): (a) controller output u, (b) "
-        "plant input sat(u) and (c) both at the beginning with the thesis's theta1~; (d) to (f) the same with the "
-        "corrected one, which has theta1~(0) = -1; dotted: the limits, in the thesis red dashed. "
-        f"{promises(summary)} The text says that the damaging effects of the saturation are resolved. With the "
-        f"thesis's theta1~ {thesis}; with the corrected one {corrected}. {chosen_limit(tables)}"
+        "Controller output u and plant input sat(u) in the runs of Fig. 4.3 (thesis Fig. 4.4): (a) u with the thesis's "
+        "theta1~, (b) its beginning, (c) a few cycles; (d) to (f) with the corrected one. Beyond "
+        f"{limits(tables)} (dotted) the scale is logarithmic. Pale range: u swings faster than the page can show. With "
+        f"the thesis's theta1~ {thesis}; with the corrected one {corrected}."
     )
 
 
 @styled()
 def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
-    """Return the figure: a column for each anti-windup; controller output, plant input, and both enlarged."""
-    axes = panels.lettered(FULL_WIDTH, 5.2, "ad;be;cf")
-    limit = of_run(tables["extended_summary"], "none", "limit")
+    """Return the figure: a column for each anti-windup; the whole run, its beginning, and a few cycles of that."""
+    axes = panels.lettered(FULL_WIDTH, 5.6, "ad;be;cf")
+    limit, table = of_run(tables["extended_summary"], "none", "limit"), tables["extended"]
+    runs = ("thesis", "corrected")
+    start, cycles = until(table, beginning(tables, *runs)), until(table, few_cycles(tables, *runs))
     for (above, middle, below), run in zip((("a", "b", "c"), ("d", "e", "f")), (THESIS, CORRECTED), strict=True):
-        panels.controls(axes[above], tables["extended"], run, limit, "control")
-        panels.controls(axes[middle], tables["extended"], run, limit, "saturated")
-        panels.controls(axes[below], tables["extended"], run, limit, "control", "saturated")
-        axes[below].set_xlim(0, beginning(tables, "thesis", "corrected"))
+        panels.controls(axes[above], table, run, limit, "control")
+        panels.controls(axes[middle], start, run, limit, "control", "saturated")
+        panels.controls(axes[below], cycles, run, limit, "control", "saturated")
     return panels.finished(axes, "ad", "be", "cf")

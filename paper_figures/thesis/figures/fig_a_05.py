@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from paper_figures.axis_figures.rates import CONTINUOUS, METHODS, over_rate
+from paper_figures.axis_figures.rates import CONTINUOUS, over_rate
 from paper_figures.look import panels
 from paper_figures.look.captions import duration, number, only, sampling_rate, settled
 from paper_figures.look.panels import CORRECTED, NONE, THESIS
@@ -28,32 +28,23 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     summary = tables["sampled_summary"]
     rates = np.unique(summary["rate_hz"].dropna())
     quantum = only(summary, "quantum")
-    samples = [number(rate * 2 * math.pi / only(summary, "root")) for rate in rates[[0, -1]]]
-    levels = round(2 * only(summary, "limit") / quantum)
     tustin, held = (
-        " and ".join(_size(_of(summary, "corrected", method, rate, "steady_error")) for rate in rates[[0, -1]])
+        " to ".join(_size(_of(summary, "corrected", method, rate, "steady_error")) for rate in rates[[0, -1]])
         for method in ("tustin", "exact")
     )
     shown, slowest, fastest = (sampling_rate(hertz) for hertz in (only(summary, "shown_hz"), *rates[[0, -1]]))
-    lasting = _size(_of(summary, "thesis", CONTINUOUS, math.nan, "steady_error"))
     ends = [
         settled(_of(summary, "corrected", method, rate, "settling_s"))
         for method, rate in ((CONTINUOUS, math.nan), ("tustin", only(summary, "shown_hz")))
     ]
     return (
-        "What a real drive makes of the loop with dead time (not in the thesis): the controller on a computer, and an "
-        f"actuator with the limits +-{number(only(summary, 'limit'))}, {levels} steps of {number(quantum, 2)} between "
-        f"them, {duration(only(summary, 'full_range_s'))} to go from one to the other, and a sample late. (a) "
-        "The greatest error from t0 on; broad, in continuous time; thin, with the drive at "
-        f"{shown}, its controller by Tustin's rule. With the corrected anti-windup the "
-        f"error {ends[0]} in continuous time and {ends[1]} with the drive (to 1 % of the reference's amplitude around "
-        f"its offset). (b) The greatest error of the last period ({number(only(summary, 'period_s'))} s) over the "
-        f"sampling rate, {samples[0]} to {samples[1]} samples in a period of the controller's fastest root, "
-        f"{number(only(summary, 'root'))} rad/s; dotted, the rate of (a). A block whose input is held answers half a "
-        "sample late, which takes the model of the reference out of place by the sample time, Tustin's rule by its "
-        f"square: with the corrected anti-windup the error at {slowest} and {fastest} is "
-        f"{held} with held inputs, {tustin} with Tustin's rule, part of which is the actuator's steps. The offset "
-        f"of the thesis's anti-windup, {lasting} in continuous time, stays.{_divergent(summary)}"
+        f"A real drive: limits +-{number(only(summary, 'limit'))} in "
+        f"{round(2 * only(summary, 'limit') / quantum)} steps, {duration(only(summary, 'full_range_s'))} across, one "
+        f"sample late. (a) The largest error from t0 on: broad, continuous time; thin, the drive at "
+        f"{shown}, Tustin's rule. Corrected, it {ends[0]} and {ends[1]}. (b) The largest error of "
+        f"the last period; dotted, the rate of (a). Corrected, at {slowest} to {fastest}: {held} m with held inputs, "
+        f"{tustin} m with Tustin's rule. The thesis's offset, "
+        f"{_size(_of(summary, 'thesis', CONTINUOUS, math.nan, 'steady_error'))} m, stays.{_divergent(summary)}"
     )
 
 
@@ -70,14 +61,9 @@ def _size(error: float) -> str:
 
 
 def _divergent(summary: pd.DataFrame) -> str:
-    """Which of the runs with a drive are not there because they diverge."""
-    gone = summary[summary["steady_error"].isna() & summary["rate_hz"].notna()]
-    labels = {run.name: run.label for run in RUNS}
-    said = [
-        f"{labels[str(row.run)]}, {METHODS[str(row.method)][0]}, {sampling_rate(float(str(row.rate_hz)))}"
-        for row in gone.itertuples()
-    ]
-    return f" Not drawn, since it diverges: {'; '.join(said)}." if said else ""
+    """How many of the runs with a drive are not there because they diverge."""
+    gone = int((summary["steady_error"].isna() & summary["rate_hz"].notna()).sum())
+    return f" Divergent runs, not drawn: {gone}." if gone else ""
 
 
 @styled()
@@ -93,12 +79,12 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
         drive = panels.envelope(time_s, tails[f"error_{run.name}_drive"])
         axes["a"].plot(*drive, **(line | {"linewidth": 1.0}), label=run.label, zorder=3 + order)
     axes["a"].plot([], [], color=BROAD, linewidth=4.0, label="continuous time")
-    axes["a"].set(xlabel="Time $t_0$ [s]", ylabel=r"$\max_{t \geq t_0}\,|e(t)|$")
+    axes["a"].set(xlabel="Time $t_0$ [s]", ylabel=r"$\max_{t \geq t_0}\,|e(t)|$ [m]")
     axes["a"].set_xlim(0, time_s[-1] - only(summary, "period_s"))
     axes["a"].legend(**panels.ABOVE, ncols=2)
     over_rate(axes["b"], summary, [run.name for run in RUNS])
     axes["b"].axvline(only(summary, "shown_hz"), **LINES["family 6"])
-    axes["b"].set_ylabel(r"$\max\,|e(t)|$, last period")
+    axes["b"].set_ylabel(r"$\max\,|e(t)|$, last period [m]")
     axes["b"].legend(**panels.ABOVE, ncols=2)
     peaks = np.array([tail[0] for tail in tails.values() if np.isfinite(tail[0])])
     top = 2 * min(peaks.max(), DIVERGENT * peaks.min()) if len(peaks) else 1.0

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,49 +18,28 @@ from paper_figures.look.style import FULL_WIDTH, LINES, styled
 TABLES: tuple[str, ...] = ("conditions", "conditions_summary")
 
 NAMES = {"implied": "implied set", "table": "Table 2.1"}
-STARTS = "from rest", "from $y(0) = r(0)$"
 PANELS = {
-    "a": ("error", "error_after_1s", "Largest $|e|$ after 1 s"),
+    "a": ("error", "error_after_1s", "Largest $|e|$ after 1 s [m]"),
     "b": ("desaturation", "desaturation_s", "Last saturation [s]"),
     "c": ("recovery", "recovery_saturation_s", "Last saturation [s]"),
     "d": ("recovery", "recovery_to_offset_s", "Settled to an offset [s]"),
-}
-WORDS = {
-    "error_after_1s": "after the first second",
-    "desaturation_s": "as the last saturation",
-    "recovery_saturation_s": "as the last saturation",
-    "recovery_1_s": "as settling to 1 % of the amplitude",
-    "recovery_to_offset_s": "as settling to an offset",
-    "peak_percent": "in the last period",
 }
 CHAPTER_2 = ("delay_free_error", "peak_percent")
 JOINT = ("error", "desaturation", "recovery")
 VIEW = 0.8, 2.9  # of the limits of chapter 4, in multiples of the input that tracking needs
 DOTS = {"color": LINES["second-order Pade"]["color"], "linestyle": "none", "marker": ".", "markersize": 2.0}
+LIMIT = "Limit $L$ [unit of $u$]"
 NONE, THESIS = "without anti-windup", "thesis anti-windup"
 
 
 def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the caption with the numbers of the tables."""
     summary = tables["conditions_summary"]
-    none, thesis = ("error_after_1s", "desaturation_s"), tuple(name for name in WORDS if name.startswith("recovery"))
-    starts = summary[(summary["search"] == "alone") & (summary["outcome"] == "error")]["initial_output"]
-    return " ".join(
-        [
-            "The outcomes that the thesis prints (grey, half a unit of the last digit to both sides), over the limits "
-            "+-L that chapter 4 does not print; how its words are read is our choice. Strong lines: the implied set; "
-            "pale ones: Table 2.1; broad: from rest; thin: from y(0) = r(0); dots: second-order Pade approximation; "
-            "dashed: the limit that tracking needs.",
-            "(a, b) Without and (c, d) with the thesis's anti-windup. From rest,",
-            f"{_each(summary, (*none, *thesis), 0.0)}.",
-            f"From y(0) = r(0) = {number(starts.max())}, {_each(summary, (*none, *thesis), float(starts.max()))}.",
-            f"The Pade approximation moves no limit that gives an outcome by more than {_moved(summary)} %.",
-            "(e) All three from one limit and one initial output, filled: the implied set, hollow: Table 2.1.",
-            _joint(summary, "together"),
-            _joint(summary, "together, converging"),
-            "(f) Chapter 2: its limit is printed (dotted), its weights and initial state are not; thin: from r's mean.",
-            _chapter_2(summary),
-        ]
+    return (
+        "The outcomes that the thesis prints (grey) over the limits +-L, which it does not print. (a, b) Without, "
+        "(c, d) with its anti-windup. (e) All three from one limit and one initial output: the nearest "
+        f"{_joint(summary, 'together')}; where the error converges, {_joint(summary, 'together, converging')}. (f) "
+        f"Chapter 2: {_chapter_2(summary)}"
     )
 
 
@@ -86,38 +64,6 @@ def _said(summary: pd.DataFrame, outcome: str) -> str:
     return f"{number(_rows(summary, outcome=outcome)['printed'].iloc[0])} {unit}"
 
 
-def _each(summary: pd.DataFrame, readings: Iterable[str], output: float) -> str:
-    """Which limits give the outcomes in these readings, set by set, with the exact dead time."""
-    parts = []
-    for reading in readings:
-        rows = _rows(summary, search="alone", reading=reading, initial_output=output)
-        sets = [f"{_limits(part)}{NAMES[str(name)]})" for name, part in rows[rows["delay"] != "pade"].groupby("set")]
-        parts.append(f"{_said(summary, rows['outcome'].iloc[0])} {WORDS[reading]} comes at {' and '.join(sets)}")
-    return "; ".join(parts)
-
-
-def _limits(rows: pd.DataFrame) -> str:
-    """The limits at which an outcome is met, or what comes nearest, and an open bracket."""
-    met = rows[rows["met"] == 1]
-    spans = [
-        f"L = {number(at, 4)}" if high - low < 0.01 * at else f"L from {number(low)} to {number(high)}"
-        for low, high, at in met[["limit_low", "limit_high", "limit"]].to_numpy(float)
-    ]
-    computed, limit = rows["computed"].iloc[0], rows["limit"].iloc[0]
-    if spans:
-        return f"{', '.join(spans)} ("
-    return "no L (" if math.isnan(computed) else f"no L ({number(computed)} at {number(limit, 4)} is nearest, "
-
-
-def _moved(summary: pd.DataFrame) -> str:
-    """The largest relative change of a limit by the Pade approximation, in percent, to one digit."""
-    met = summary[(summary["search"] == "alone") & (summary["met"] == 1)]
-    keys = ["outcome", "reading", "set", "initial_output"]
-    exact, pade = (met[met["delay"] == delay].groupby(keys)["limit"].first() for delay in ("exact", "pade"))
-    both = pd.concat([exact, pade], axis=1, keys=["exact", "pade"]).dropna()
-    return number(100 * float((both["pade"] / both["exact"] - 1).abs().max()), 1)
-
-
 def _nearest(summary: pd.DataFrame, search: str) -> pd.DataFrame:
     """The three rows of the condition that comes nearest in a joint search, by outcome."""
     rows = _rows(summary, search=search)
@@ -127,27 +73,20 @@ def _nearest(summary: pd.DataFrame, search: str) -> pd.DataFrame:
 
 
 def _joint(summary: pd.DataFrame, search: str) -> str:
-    said = {"together": "Whatever the error comes to", "together, converging": "Where the error converges to zero"}
     if (summary["search"] != search).all():
-        return f"{said[search]}, no point of the search has all three outcomes."
+        return "none was found"
     best = _nearest(summary, search)
     first = best.iloc[0]
-    values = ", ".join(f"{number(best['computed'][name])} for {_said(summary, name)}" for name in JOINT)
-    verdict = "gives them all" if best["met"].all() else f"misses by {number(100 * first['worst_miss'], 2)} %"
-    return (
-        f"{said[search]}, the nearest, L = {number(first['limit'], 4)} and y(0) = {number(first['initial_output'])} "
-        f"({NAMES[first['set']]}), {verdict}: {values}; the error of the last period is "
-        f"{number(first['final_error_percent'], 2)} % of the amplitude."
-    )
+    verdict = "gives them" if best["met"].all() else f"misses by {number(100 * first['worst_miss'], 2)} %"
+    return f"(L = {number(first['limit'], 4)}, y(0) = {number(first['initial_output'])}) {verdict}"
 
 
 def _chapter_2(summary: pd.DataFrame) -> str:
     least = _rows(summary, search="weights").nsmallest(1, "computed").iloc[0]
     bound = _rows(summary, search="any controller")["computed"].min()
     return (
-        f"Over the weights and initial outputs tried, the least error at L = {number(least['limit'])} is "
-        f"{number(least['computed'])} % of the amplitude (dot); no controller stays below {at_least(bound)} % (bar). "
-        f"From y(0) = r(0), {_each(summary, CHAPTER_2[1:], 0.0)}."
+        f"at the printed L = {number(least['limit'])} the least error found over the unprinted conditions is "
+        f"{number(least['computed'])} % of the amplitude; no controller stays below {at_least(bound)} %."
     )
 
 
@@ -163,10 +102,14 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
         _printed(panel, summary, outcome)
         _lines(panel, extended, reading, kind)
         panel.axvline(required, **LINES["reference"])
-        panel.set(xlabel="Limit $L$", ylabel=label, xlim=(VIEW[0] * required, VIEW[1] * required))
+        panel.set(xlabel=LIMIT, ylabel=label, xlim=(VIEW[0] * required, VIEW[1] * required))
         panel.set_ylim(bottom=0)
-    _key(axes["a"], NONE, "none")
-    _key(axes["c"], THESIS, "thesis")
+    for letter, kind, words in (("a", NONE, "none"), ("c", THESIS, "thesis")):
+        _key(axes[letter], _look(kind, 0, "implied") | {"label": f"{words}, from rest"})
+        _key(axes[letter], _look(kind, 1, "implied") | {"label": "from $y(0) = r(0)$"})
+    _key(axes["b"], LINES["family 4"] | {"label": "printed"}, DOTS | {"markersize": 4.0, "label": "Pade"})
+    _key(axes["d"], _look(THESIS, 0, "table") | {"label": "Table 2.1"})
+    _key(axes["d"], LINES["reference"] | {"label": "needed to track"})
     axes["b"].set_ylim(top=12)
     axes["c"].set_ylim(top=8)
     _ratios(axes["e"], summary)
@@ -177,14 +120,15 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
 
 
 def _look(kind: str, start: int, name: str) -> dict[str, Any]:
-    """The line of an anti-windup from one of STARTS with a parameter set."""
+    """The line of an anti-windup from rest (0) or from y(0) = r(0) (1) with a parameter set."""
     line = LINES[kind] | {"linewidth": (1.8, 0.8)[start]}
     return line if name == "implied" else line | {"color": panels.paler(line["color"], 0.5)}
 
 
-def _key(panel: Axes, kind: str, label: str) -> None:
-    for start, words in enumerate(STARTS):
-        panel.plot([], [], **_look(kind, start, "implied"), label=words if start else f"{label}, {words}")
+def _key(panel: Axes, *looks: Mapping[str, Any]) -> None:
+    """Add lines to the key of a panel."""
+    for look in looks:
+        panel.plot([], [], **look)
     panels.key(panel)
 
 
@@ -235,9 +179,10 @@ def _ratios(panel: Axes, summary: pd.DataFrame) -> None:
                 label=label if name == "implied" else None,
             )
     panel.set_xticks(range(3), [_said(summary, outcome) for outcome in JOINT])
-    panel.set(ylabel="Computed/printed", xlim=(-0.5, 2.5))
+    panel.set(xlabel="Printed outcome", ylabel="Computed/printed [-]", xlim=(-0.5, 2.5))
     panel.set_ylim(0, 1.1 * panel.get_ylim()[1])
-    panels.key(panel)
+    hollow = {"linestyle": "none", "marker": "o", "markersize": 4.5, "color": color, "markerfacecolor": "#FFFFFF"}
+    _key(panel, hollow | {"label": NAMES["table"]})
 
 
 def _errors(panel: Axes, rows: pd.DataFrame, summary: pd.DataFrame) -> None:
@@ -246,8 +191,10 @@ def _errors(panel: Axes, rows: pd.DataFrame, summary: pd.DataFrame) -> None:
     _printed(panel, summary, outcome)
     _lines(panel, rows[rows["weights"] == "usual"].drop_duplicates(["set", "initial_output", "limit"]), reading, THESIS)
     least, bound = (_rows(summary, search=search) for search in ("weights", "any controller"))
-    panel.plot(least["limit"], least["computed"], **LINES["family 1"] | {"linestyle": "none"}, marker="o", markersize=4)
-    panel.plot(bound["limit"], bound["computed"], **LINES["family 1"] | {"linestyle": "none"}, marker="_", markersize=9)
-    panel.axvline(float(least["limit"].iloc[0]), **LINES["saturation limits"])
-    panel.set(xlabel="Limit $L$", ylabel="$|e|$, last period [%]", yscale="log", ylim=(1e-2, 200))
+    look = {"color": LINES["family 1"]["color"], "linestyle": "none"}
+    panel.plot(least["limit"], least["computed"], **look, marker="o", markersize=4, label="found")
+    panel.plot(bound["limit"], bound["computed"], **look, marker="_", markersize=9, label="bound")
+    panel.axvline(float(least["limit"].iloc[0]), **LINES["saturation limits"], label="printed $L$")
+    panels.key(panel)
+    panel.set(xlabel=LIMIT, ylabel="$|e|$, last period [%]", yscale="log", ylim=(1e-2, 200))
     panel.set_xlim(0.9 * float(least["limit"].iloc[0]), 1.2 * float(least["limit"].iloc[0]))

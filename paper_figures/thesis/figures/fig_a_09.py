@@ -26,16 +26,12 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     summary = tables["hidden_modes_summary"]
     bits, resolution, limit = (only(summary, column) for column in ("bits", "resolution", "limit"))
     return (
-        "What rounding inside the controller makes of the output (not in the thesis): the loop of chapter 4 on a "
-        f"computer at {sampling_rate(only(summary, 'rate_hz'))}, by Tustin's rule, for "
-        f"{duration(only(summary, 'duration_s'), 4)} of the thesis's reference, under the limits +-{number(limit)} and "
-        f"with the corrected anti-windup. The computer cuts v down to a multiple of {number(resolution)}, 1/2^{bits:g} "
-        "of the range between the limits. The drift, in the unit of y, is the output of this run less that of a run "
-        "without rounding. (a) As drawn in Fig. 2.6, K and 1/(1 - T_so T_si) hide the plant's poles in Re s >= 0: what "
-        "is rounded between the two reaches y through the plant, and no feedback corrects it. "
-        f"{_said(summary, 'thesis')}{_expected(summary)}. Without hidden modes the controller is the same transfer "
-        f"function, and the loop corrects what is rounded in it. {_said(summary, 'coprime')}. (b) The size of the same "
-        "drift on logarithmic axes."
+        f"Rounding v to multiples of {number(resolution)} (1/2^{bits:g} of the range +-{number(limit)}) moves the "
+        f"output of chapter 4's loop, at {sampling_rate(only(summary, 'rate_hz'))} by Tustin's rule, in "
+        f"{duration(only(summary, 'duration_s'), 4)}. As drawn in Fig. 2.6, K and 1/(1 - T_so T_si) hide the plant's "
+        "poles in Re s >= 0; no feedback corrects rounding between them. "
+        f"{_said(summary, 'thesis')}{_expected(summary)}. The same transfer function without hidden modes: "
+        f"{_said(summary, 'coprime')}."
     )
 
 
@@ -43,7 +39,7 @@ def _said(summary: pd.DataFrame, form: str) -> str:
     drift, largest = (of_run(summary, form, column) for column in ("drift", "largest_drift"))
     if math.isnan(drift):
         return "The loop diverges"
-    return f"The drift ends at {number(drift)}, its largest size is {number(largest)}"
+    return f"The drift ends at {number(drift)} m (at most {number(largest)})"
 
 
 def _expected(summary: pd.DataFrame) -> str:
@@ -52,7 +48,7 @@ def _expected(summary: pd.DataFrame) -> str:
     if math.isnan(expected):
         return ""
     growth = GROWTH[int(only(summary, "integrators"))]
-    return f"; half a step, which is cut off on average, makes -K (step/2){growth} = {number(expected)} (dashed)"
+    return f"; half a step makes -K (step/2){growth} = {number(expected)} m (dashed)"
 
 
 @styled()
@@ -71,7 +67,7 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
         axes["a"].plot(time_s, line, **LINES["reference"])
         axes["b"].loglog(time_s, line.abs(), **LINES["reference"], label="half a step")
         axes["b"].legend(**panels.ABOVE)
-    axes["a"].set(xlabel="Time $t$ [s]", ylabel="Drift of the output $y$", xlim=(0, time_s.iloc[-1]))
-    axes["b"].set(xlabel="Time $t$ [s]", ylabel="Size of the drift", xlim=(time_s.iloc[0], time_s.iloc[-1]))
+    axes["a"].set(xlabel="Time $t$ [s]", ylabel="Drift of the output $y$ [m]", xlim=(0, time_s.iloc[-1]))
+    axes["b"].set(xlabel="Time $t$ [s]", ylabel="Size of the drift [m]", xlim=(time_s.iloc[0], time_s.iloc[-1]))
     axes["a"].legend(**panels.ABOVE, ncols=2)
     return axes["a"].figure  # type: ignore[return-value]

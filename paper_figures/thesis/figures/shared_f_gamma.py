@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
 import pandas as pd
 
 from paper_figures.look.captions import only
@@ -22,3 +23,8 @@ def lowest(curve: pd.DataFrame) -> tuple[float, float]:
     """Return gamma and f where f is least."""
     row = curve.iloc[int(curve["f"].to_numpy().argmin())]
     return float(row["gamma"]), float(row["f"])
+
+
+def at_zero(curve: pd.DataFrame) -> float:
+    """Return f(0) = ||W_a||_inf, which is the same for each beta."""
+    return float(np.interp(0.0, curve["gamma"], curve["f"]))
