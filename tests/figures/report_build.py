@@ -116,7 +116,8 @@ class Page(HTMLParser):
         self.ids: list[str] = []
         self.text = ""
         self._inside: list[str] = []
-        self._cell = ""
+        self._cell = self._tag = ""
+        self._held: list[tuple[str, str]] | None = None
         self.feed(html)
         self.close()
 
@@ -129,26 +130,29 @@ class Page(HTMLParser):
             self.pictures.append(given)
         if tag in ("script", "style"):
             self._inside.append(tag)
-            if (held := self._held(given)) is not None:
-                held.append((given["data-table" if held is self.tables else "data-picture"] or "", ""))
+            self._held = {"table": self.tables, "svg": self.svgs}.get(given.get("class") or "")
+            if self._held is not None:
+                self._held.append((given.get("data-table") or given.get("data-picture") or "", ""))
         if tag == "tr" and "data-verdict" in given:
             self.rows.append({})
-        if tag == "td":
-            self._cell = given.get("data-label") or ""
+        if "data-label" in given:
+            self._cell, self._tag = given["data-label"] or "", tag
+        if self._cell == "quote" and "data-source" in given:
+            self.rows[-1]["quote"] = given["data-source"] or ""
 
     def handle_endtag(self, tag: str) -> None:
         """Note what ends."""
         if tag in ("script", "style"):
             self._inside.pop()
-        if tag == "td":
+        if tag == self._tag:
             self._cell = ""
 
     def handle_data(self, data: str) -> None:
         """Note the text."""
         if self._inside:
-            if self._inside[-1] == "script" and self.tables and not self.tables[-1][1]:
-                self.tables[-1] = (self.tables[-1][0], data)
+            if self._inside[-1] == "script" and self._held is not None:
+                self._held[-1] = (self._held[-1][0], data)
             return
         self.text += data
-        if self._cell:
+        if self._cell not in ("", "quote"):
             self.rows[-1][self._cell] = self.rows[-1].get(self._cell, "") + data
