@@ -106,6 +106,7 @@ release-check: $(READY) ## say whether this commit can be released: tree, versio
 	@build/release/environment/bin/python -m pip install --quiet --require-hashes --requirement requirements.lock
 	@build/release/environment/bin/python -m pip install --quiet --no-deps --no-index build/release/*.whl
 	@cd build/release && environment/bin/antiwindup --version
+	@cd build/release && environment/bin/antiwindup design extended implied --reference-hz 0.25 --output design.json
 clean: ## remove what was built, but for .venv
 	rm -rf build
 

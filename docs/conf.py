@@ -64,6 +64,7 @@ nb_merge_streams = True
 add_module_names = False
 autodoc_typehints = "none"
 autodoc_default_options = {"members": True, "show-inheritance": False}
+viewcode_follow_imported_members = False  # else the way back from the source of a room's face is lost
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 

@@ -19,7 +19,7 @@ from design.hinf.mixed_sensitivity import Synthesis
 PEAK = 1e-6  # relative: the project's peaks are refined to rounding, ours to better than this
 SECTOR = 5e-5  # of 1/k: half a unit of the last of four digits, as the audit prints it
 PROVED = 1e-6  # relative: what is said to be proved may be off by rounding alone
-NEAR_OPTIMAL = 0.01  # README: gamma_line is at most 1 % above gamma_line_lower
+NEAR_OPTIMAL = 0.01  # gamma_line is at most 1 % above gamma_line_lower
 
 
 def check(case: Case) -> list[Finding]:

@@ -151,6 +151,21 @@ def conditions(scheduler: str | None, output: Path) -> None:
         write_into(output, conditions_tables(each=partial(there, tick=bar.update)))
 
 
+@thesis.command("wide-conditions")
+@OUTPUT_FOLDER
+def wide_conditions(output: Path) -> None:
+    """More of what the thesis does not print, in some ten minutes: wide_conditions.csv."""
+    from functools import partial
+
+    from tqdm import tqdm
+
+    from experiments.runs.batch import threaded
+    from experiments.thesis.unprinted.wide_search import wide_conditions_table
+
+    with tqdm(desc="conditions", unit="", disable=None, leave=False) as bar:
+        write_into(output, {"wide_conditions": wide_conditions_table(each=partial(threaded, tick=bar.update))})
+
+
 @thesis.command("sampled-rates")
 @DESIGN
 @LIMIT

@@ -65,6 +65,8 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def pages(site: Path) -> dict[Path, Page]:
     found = {}
     for path in site.rglob("*.html"):
+        if "_static" in path.parts:
+            continue  # of the theme
         found[path] = page = Page()
         page.feed(path.read_text(encoding="utf-8"))
     return found
@@ -89,7 +91,8 @@ def test_every_local_link_leads_to_a_place(pages: dict[Path, Page]) -> None:
 def test_every_page_has_a_title_and_no_formula_is_left_as_it_is_typed(pages: dict[Path, Page]) -> None:
     assert len(pages) > 100
     assert [path.name for path, page in pages.items() if not page.title.strip()] == []
-    assert [(path.name, words) for path, page in pages.items() for words in page.words if "$" in words] == []
+    written = {path: page for path, page in pages.items() if "api" not in path.parts}  # docstrings have no formulas
+    assert [(path.name, words) for path, page in written.items() for words in page.words if "$" in words] == []
 
 
 @pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.stem)

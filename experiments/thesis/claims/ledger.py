@@ -17,7 +17,7 @@ from experiments.thesis.claims.printed_number import PrintedNumber, read_number
 from identification.base.errors import InputError
 
 LEDGER = THESIS / "claims.csv"
-COLUMNS = ("id", "where", "quote", "printed", "unit", "kind", "compute", "status", "reason", "evidence")
+COLUMNS = ("id", "where", "quote", "printed", "unit", "kind", "compute", "status", "touches", "reason", "evidence")
 SLACK = 1e-9  # relative; the square of a printed frequency may lie half-way between two printed roundings of it
 
 FUNCTION = r"experiments(\.\w+)+:[a-zA-Z]\w*"

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from design.blocks.block import plant_block
-from design.blocks.state_space import realize
+from design.blocks.state_space import StateSpace, realize
 from design.design_file import Design
 from experiments.engine.pade import with_pade
 from experiments.engine.ready_loop import ReadyLoop, ready_loop
@@ -151,13 +151,18 @@ def starting_at(loop: SaturatedLoop, design: Design, output: float) -> Saturated
         it, the modes are at rest. Controller and anti-windup are at zero, and so is the input of the past, so that
         y = ``output`` until the dead time is over.
     """
-    P = realize(plant_block(design.loop_plant))
-    held = np.linalg.lstsq(np.vstack([P.A, P.C]), np.append(np.zeros(len(P.b)), output))[0]
-    held *= output / (P.C[0] @ held) if output else 0.0
+    held = output * held_state(realize(plant_block(design.loop_plant)))
     first = len(thesis_reference(design.kind, design.reference_omegas).generator().start)
     x0 = loop.x0.copy()
     x0[first : first + len(held)] = held
     return replace(loop, x0=x0)
+
+
+def held_state(P: StateSpace) -> np.ndarray:
+    """The state (n,) in which a plant that integrates keeps the output 1 without input: A x = 0, C x = 1."""
+    held: np.ndarray = np.linalg.lstsq(np.vstack([P.A, P.C]), np.append(np.zeros(len(P.b)), 1.0))[0]
+    held /= P.C[0] @ held
+    return held
 
 
 def with_pade_at_rest(loop: SaturatedLoop, order: int) -> SaturatedLoop:

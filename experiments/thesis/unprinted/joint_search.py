@@ -21,6 +21,8 @@ EVALUATIONS = 30  # of one such search
 SEARCHES = {"together": False, "together, converging": True}
 """What is searched for -> whether the error with anti-windup must converge to zero."""
 
+Readings = Mapping[str, tuple[str, ...]]  # of each outcome
+
 _MOST = 1e6  # stands for an infinite miss: the search takes differences
 
 
@@ -48,7 +50,7 @@ class Joint(NamedTuple):
 Start = tuple[Conditions, Joint, list[np.ndarray], bool]  # with the grid's limits and outputs, and whether to converge
 
 
-def judged(point: Point, outcomes: Mapping[str, float], converging: bool) -> Joint:
+def judged(point: Point, outcomes: Mapping[str, float], converging: bool, readings: Readings = READINGS) -> Joint:
     """How near a point comes, each outcome in the reading that comes nearest.
 
     Parameters
@@ -58,13 +60,15 @@ def judged(point: Point, outcomes: Mapping[str, float], converging: bool) -> Joi
     converging
         Whether the error with anti-windup must converge to zero, as section 4.2 says of Fig. 4.3; where it does not,
         the miss is infinite.
+    readings
+        Of each outcome.
 
     Notes
     -----
     The measure is our choice. Outcomes that are all within half a unit of their last digits miss by at most the
     greatest half_unit/printed, 0.125 for "around 4".
     """
-    found = _nearest_readings(outcomes)
+    found = nearest_readings(outcomes, readings)
     worst = max(miss for miss, _ in found)
     met = not converging or outcomes["final_error_percent"] < CONVERGED_PERCENT
     return Joint(worst if met else math.inf, point, tuple(reading for _, reading in found), outcomes)
@@ -72,13 +76,13 @@ def judged(point: Point, outcomes: Mapping[str, float], converging: bool) -> Joi
 
 def least_miss(outcomes: Mapping[str, float]) -> float:
     """What a point misses by at least, of which some outcomes have been computed."""
-    return max(miss for miss, _ in _nearest_readings(outcomes))
+    return max(miss for miss, _ in nearest_readings(outcomes))
 
 
-def _nearest_readings(outcomes: Mapping[str, float]) -> list[tuple[float, str]]:
+def nearest_readings(outcomes: Mapping[str, float], readings: Readings = READINGS) -> list[tuple[float, str]]:
     """Of each outcome that has been computed: by how much its nearest reading misses, and which that is."""
     found = []
-    for outcome, names in READINGS.items():
+    for outcome, names in readings.items():
         if names[0] in outcomes:
             misses = [abs(outcomes[name] / printed_outcomes()[outcome].value - 1) for name in names]
             found.append(

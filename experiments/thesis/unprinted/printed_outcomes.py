@@ -27,6 +27,9 @@ READINGS = {
 }
 """Outcome of chapter 4 -> the quantities that its words may mean, all ours; see the two functions that compute them."""
 
+COUNTED_FROM_THE_END = READINGS | {"recovery": tuple(f"{name}_after" for name in READINGS["recovery"][1:])}
+"""The same with 4.46 s counted from the last saturation of the run with anti-windup."""
+
 OUTCOMES = {
     "none": (*READINGS["error"], *READINGS["desaturation"]),
     "thesis": (*READINGS["recovery"], "final_error_percent", "final_offset_percent"),
@@ -110,6 +113,12 @@ def with_anti_windup(run: Run, amplitude: float, span_s: float) -> dict[str, flo
         "final_error_percent": 100 * float(np.abs(tail).max()) / amplitude,
         "final_offset_percent": 100 * float(offset) / amplitude,
     }
+
+
+def after_saturation(outcomes: dict[str, float]) -> dict[str, float]:
+    """The outcomes of :func:`with_anti_windup`, and each settling counted from the last saturation on."""
+    last = outcomes["recovery_saturation_s"]
+    return outcomes | {f"{name}_after": outcomes[name] - last for name in READINGS["recovery"][1:]}
 
 
 def settled_s(time_s: np.ndarray, error: np.ndarray, band: float) -> float:

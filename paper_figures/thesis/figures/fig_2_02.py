@@ -24,14 +24,11 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     )
     return (
         "PID benchmark without anti-windup (thesis Fig. 2.2): (a) reference r and output y, (b) controller output u "
-        "and saturated input sat(u) with the limits, gains swapped, C(s) = 4.5 + 0.5/s; (c), (d) the same for the "
-        "gains as printed, C(s) = 0.5 + 4.5/s. As printed the loop limit-cycles: over the last third of the run y "
-        f"still swings {captions.between(last['output_printed_none'])} and u "
-        f"{captions.between(last['control_printed_none'])}. With the swapped gains the text's overshoot is there, "
+        "and sat(u), gains swapped, C(s) = 4.5 + 0.5/s; (c), (d) as printed, C(s) = 0.5 + 4.5/s. Beyond the limits "
+        "(dotted) the scale is logarithmic. As printed the loop limit-cycles: in the last third y lies "
+        f"{captions.between(last['output_printed_none'])}. Swapped, y overshoots by "
         f"{number(only(summary, 'overshoot_swapped_none'))} %; u rises to "
-        f"{captions.largest(table['control_swapped_none'])} and {within}. It does not settle outside of the limits, "
-        "as the text has it: the integrator in C(s) rests only where y = r, which an overshoot shows to be within "
-        f"reach. {shared_pid.setting(summary)}"
+        f"{captions.largest(table['control_swapped_none'])} and {within}. {shared_pid.setting(summary)}"
     )
 
 

@@ -22,14 +22,13 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     within = captions.last_saturated(captions.last_outside(table["time_s"], control, only(summary, "limit")))
     last = shared_pid.last_third(table)
     return (
-        "PID benchmark with back-calculation (thesis Fig. 2.3), panels as in Fig. 2.2. The text says that u and "
-        "sat(u) coincide and that there is no overshoot. With the swapped gains, C(s) = 4.5 + 0.5/s, u starts at "
-        f"{number(control.iloc[0])} and {within}, from where on the two coincide; the overshoot is "
-        f"{number(only(summary, 'overshoot_swapped_back_calculation'))} %. With the gains as printed, C(s) = 0.5 + "
-        f"4.5/s, it is {number(only(summary, 'overshoot_printed_back_calculation'))} %, and over the last third of "
-        f"the run y still lies {captions.between(last['output_printed_back_calculation'])}. The back-calculation "
-        f"coefficient is {number(only(summary, 'back_calculation'))}, the default of Simulink's PID block; it is not "
-        f"printed. {shared_pid.setting(summary)}"
+        "PID benchmark with back-calculation (thesis Fig. 2.3), panels as in Fig. 2.2. The text says that u and sat(u) "
+        f"coincide, without overshoot. With swapped gains u starts at {number(control.iloc[0])} and {within}; from "
+        f"then on the two coincide. The overshoot is {number(only(summary, 'overshoot_swapped_back_calculation'))} %. "
+        f"As printed it is {number(only(summary, 'overshoot_printed_back_calculation'))} %, and in the last third y "
+        f"lies {captions.between(last['output_printed_back_calculation'])}. The back-calculation coefficient is "
+        f"{number(only(summary, 'back_calculation'))}, the default of Simulink's PID block. "
+        f"{shared_pid.setting(summary)}"
     )
 
 

@@ -24,11 +24,10 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
         for run in ("swapped_none", "swapped_back_calculation")
     )
     return (
-        "Output y of the PID benchmark without and with back-calculation (thesis Fig. 2.4): (a) gains swapped, C(s) = "
-        "4.5 + 0.5/s, (b) as printed, C(s) = 0.5 + 4.5/s. The text says that the output with anti-windup reaches the "
-        f"steady state faster and without overshoot. With the swapped gains it {having}, within 2 % of the "
-        f"reference; without anti-windup it {without}. As printed it "
-        f"{shared_pid.settling(table, 'printed_back_calculation')} with back-calculation and "
+        "Output y of the PID benchmark without and with back-calculation (thesis Fig. 2.4): (a) gains swapped, (b) as "
+        "printed. The text has y settle sooner with anti-windup, without overshoot. With swapped gains and "
+        f"back-calculation y {having} (to 2 %); without, it {without}. As printed it "
+        f"{shared_pid.settling(table, 'printed_back_calculation')} with back-calculation, and "
         f"{shared_pid.settling(table, 'printed_none')} without. {shared_pid.setting(summary)}"
     )
 

@@ -13,11 +13,10 @@ from paper_figures.thesis.figures.block_diagrams import Diagram
 TABLES: tuple[str, ...] = ()
 
 CAPTION = (
-    "Parallel internal model control structure (thesis Fig. 2.5): the reference r is r_0 shaped by the "
-    "exogenous dynamics, K(s) turns the error e = r - y into u_lin, and the internal model units F_1(s) = "
-    "G(s) and F_2(s) are driven by the control signal u beside the plant G(s). The wiring follows from Eqs. "
-    "(2.2), (2.6), (2.14) and (3.10): u = u_lin - F_2 F_1 u, so C = K/(1 + F_1 F_2) and G_A = G/(1 + F_1 "
-    "F_2) from u_lin to y; the order of F_1 and F_2 in their path is our deduction."
+    "Parallel internal model control structure (thesis Fig. 2.5). r is r_0, shaped by the exogenous dynamics; K(s) "
+    "turns the error e = r - y into u_lin; the internal model units F_1(s) = G(s) and F_2(s) see the control signal u. "
+    "The wiring follows from Eqs. (2.2), (2.6), (2.14) and (3.10): u = u_lin - F_2 F_1 u. So C = K/(1 + F_1 F_2), and "
+    "G_A = G/(1 + F_1 F_2) from u_lin to y. The order of F_1 and F_2 is our deduction."
 )
 
 

@@ -13,12 +13,10 @@ from paper_figures.thesis.figures.block_diagrams import Diagram
 TABLES: tuple[str, ...] = ()
 
 CAPTION = (
-    "Anti-windup tracking control architecture with the internal model structure (thesis Fig. 2.6): the "
-    "actuator saturates u to u_m, and the excess u~ = u - u_m acts through theta_1(s) on the output of K(s) "
-    "and through theta_2(s) on the output of the plant. The wiring follows from Eq. (2.10): (1 + F_1 F_2) u "
-    "= u_lin - u_d with u_d = theta_1 u~, and y_lin = y + y_d with y_d = theta_2 u~. That y_lin and not y "
-    "is compared with r is deduced from Eqs. (2.12) and (2.13), by which the loop around K(s) is the linear "
-    "one, and so is the order of F_1 and F_2 in their path."
+    "Anti-windup control architecture with the internal model structure (thesis Fig. 2.6). The actuator saturates u to "
+    "u_m. The excess u~ = u - u_m acts through theta_1(s) on the output of K(s) and through theta_2(s) on the output "
+    "of the plant. The wiring follows from Eq. (2.10): (1 + F_1 F_2) u = u_lin - u_d with u_d = theta_1 u~, and y_lin "
+    "= y + y_d with y_d = theta_2 u~. By Eqs. (2.12) and (2.13), y_lin and not y is compared with r."
 )
 
 

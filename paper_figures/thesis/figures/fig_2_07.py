@@ -13,11 +13,10 @@ from paper_figures.thesis.figures.block_diagrams import Diagram
 TABLES: tuple[str, ...] = ()
 
 CAPTION = (
-    "Equivalent anti-windup scheme (thesis Fig. 2.7): the saturation of Fig. 2.6 is replaced by the dead "
-    "zone u~ = u - sat(u) = dz(u) of Eq. (2.16), which leaves the loop of K(s) and G_A(s) = G/(1 + F), F = "
-    "F_1 F_2, linear and puts the dead zone in a loop of its own with theta_1~ = theta_1/(1 + F), the loop "
-    "of Theorem 2.3.1. The drawing is deduced from Eqs. (2.10) to (2.16): u = u_lin/(1 + F) - theta_1~ u~, "
-    "y_lin = G_A u_lin and y = y_lin - y_d with y_d = theta_2 u~."
+    "Equivalent anti-windup scheme (thesis Fig. 2.7). The dead zone u~ = u - sat(u) = dz(u) of Eq. (2.16) replaces the "
+    "saturation of Fig. 2.6. The loop of K(s) and G_A(s) = G/(1 + F), F = F_1 F_2, is then linear, and the dead zone "
+    "is in a loop of its own with theta_1~ = theta_1/(1 + F): the loop of Theorem 2.3.1. The drawing follows from Eqs. "
+    "(2.10) to (2.16)."
 )
 
 

@@ -13,11 +13,10 @@ from paper_figures.thesis.figures.block_diagrams import Diagram
 TABLES: tuple[str, ...] = ()
 
 CAPTION = (
-    "System identification structure (thesis Fig. 2.8): a signal analyser drives one antenna axis with sine "
-    "sweeps of 5 V amplitude between 10 and 200 Hz and returns magnitude and phase P_EL(j omega), to which "
-    "the nominal transfer function P(s) of Eq. (2.20) is fitted; the bound W_a(s) of Eqs. (2.21) and (2.22) "
-    "then covers what the fit leaves over in all tests. The text names the sweep, the analyser and the "
-    "order of the steps; how they are drawn, and that the bound is part of the drawing, is our deduction."
+    "System identification (thesis Fig. 2.8). A signal analyser drives one antenna axis with sine sweeps of 5 V "
+    "amplitude between 10 and 200 Hz and returns the magnitude and phase of P_EL(j omega). The nominal transfer "
+    "function P(s) of Eq. (2.20) is fitted to them. The bound W_a(s) of Eqs. (2.21) and (2.22) covers what the fit "
+    "leaves over in all tests. The text gives the order of the steps; the drawing is our deduction."
 )
 
 

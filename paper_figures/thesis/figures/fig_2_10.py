@@ -31,7 +31,7 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
         f"{fraction(only(summary, 'beta'))} s, which is chosen; without anti-windup, at gamma = 0, f = ||W_a||_inf = "
         f"{number(at_zero(chosen), 4)}. Over a continuous beta the least found is f = "
         f"{number(only(summary, 'f_best'), 4)} at beta = {number(only(summary, 'beta_best'))} s, gamma = "
-        f"{number(only(summary, 'gamma_best'))}. The text does not name the beta of its curves."
+        f"{number(only(summary, 'gamma_best'))}."
     )
 
 

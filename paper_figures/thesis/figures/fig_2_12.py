@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures.look import panels
-from paper_figures.look.captions import at_least, number, of_run, promises, required_input
+from paper_figures.look.captions import at_least, number, of_run, required_input
 from paper_figures.look.panels import CORRECTED, THESIS
 from paper_figures.look.style import COLUMN_WIDTH, styled
 
@@ -25,15 +25,14 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     limit, required = (of_run(summary, "none", column) for column in ("limit", "required"))
     thesis, corrected = (
         f"{number(of_run(summary, run, 'offset'))} +- {number(of_run(summary, run, 'ripple'))} "
-        f"({number(of_run(summary, run, 'relative_error_percent'))} % of the reference's amplitude)"
-        for run in ("thesis", "corrected")
+        f"({number(of_run(summary, run, 'relative_error_percent'))} %{whose})"
+        for run, whose in (("thesis", " of the amplitude"), ("corrected", ""))
     )
     return (
-        "Tracking with input saturation under the proposed anti-windup (thesis Fig. 2.12): (a) reference r and output "
-        "y, (b) tracking error, for the thesis's theta1~ and for the corrected one, which has theta1~(0) = -1. "
-        f"{promises(summary)} {required_input(summary)}. {within_reach(limit, required)} Over the last "
-        f"period the error is {thesis} with the thesis's theta1~ and {corrected} with the corrected one. The run "
-        "starts from rest; the thesis prints neither its start nor its horizon."
+        "Tracking with the proposed anti-windup (thesis Fig. 2.12): (a) reference and output, (b) error, with the "
+        f"thesis's theta1~ and the corrected one. {required_input(summary)}. "
+        f"{within_reach(limit, required)} Over the last period the error is {thesis} with "
+        f"the thesis's theta1~ and {corrected} with the corrected one."
     )
 
 
@@ -50,8 +49,8 @@ def within_reach(limit: float, required: float) -> str:
     least = 100 * (math.sin(x) - x * math.cos(x))
     verdict = "is beyond reach" if least > CLAIMED else "is not ruled out by that"
     return (
-        f"Under these limits no controller makes an integrator follow closer than {at_least(least)} % of the "
-        f"reference's amplitude: the text's tracking error of {CLAIMED} % {verdict}."
+        f"No controller makes an integrator follow closer than {at_least(least)} % of the amplitude: the text's "
+        f"tracking error of {CLAIMED} % {verdict}."
     )
 
 

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures.look import panels
-from paper_figures.look.captions import last_saturated, number, of_run, promises
+from paper_figures.look.captions import last_saturated, number, of_run
 from paper_figures.look.panels import CORRECTED, THESIS
 from paper_figures.look.style import COLUMN_WIDTH, styled
 
@@ -32,11 +32,8 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     whose = "given" if of_run(summary, "none", "limit_is_given") else "printed"
     return (
         "Controller output u and saturated input sat(u) in the run of Fig. 2.12 (thesis Fig. 2.13): (a) with the "
-        "thesis's theta1~, (b) with the corrected one, which has theta1~(0) = -1; dotted: the "
-        f"{whose} limits of +-{number(limit)}. {promises(summary)} The text says that the controller "
-        "output is truncated at the limits. "
-        f"What is truncated is sat(u); u itself {thesis} in a run of {number(table['time_s'].iloc[-1])} s with the "
-        f"thesis's theta1~, and with the corrected one {corrected}."
+        f"thesis's theta1~, (b) with the corrected one. Dotted: the {whose} limits of +-{number(limit)}. The text says "
+        f"that the controller output is truncated at the limits. sat(u) is. In (a) u {thesis}; in (b) it {corrected}."
     )
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures.look import panels
-from paper_figures.look.captions import largest, number, of_run, required_input, settled
+from paper_figures.look.captions import largest, number, of_run, settled
 from paper_figures.look.panels import NONE
 from paper_figures.look.style import COLUMN_WIDTH, styled
 from paper_figures.thesis.figures.shared_chapter_4 import chosen_limit, pade, pade_difference
@@ -23,12 +23,10 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     after, settling = (of_run(summary, "none", column) for column in ("peak_error_after_1s", "settling_s"))
     reached = "" if math.isnan(after) else f"reaches {number(after)} after the first second and "
     return (
-        "Output under input saturation without anti-windup, plant with dead time (thesis Fig. 4.1): (a) reference r "
-        "and output y, (b) tracking error, (c) the exact output less that of the same loop with second-order Pade "
-        "approximations, as section 4.2 has it, in place of every dead time: at most "
-        f"{largest(pade_difference(table, NONE))}. {chosen_limit(tables)} {required_input(summary)}. The text "
-        f"reads an error of about 8.6 m from its plot; here |e| starts at {number(abs(table['error_none'].iloc[0]))}, "
-        f"{reached}{settled(settling)}."
+        "Output without anti-windup (thesis Fig. 4.1): (a) reference r and output y, (b) error, "
+        "(c) what second-order Pade approximations change in y: at most "
+        f"{largest(pade_difference(table, NONE))}. {chosen_limit(tables)} The text reads an error of about 8.6 m from "
+        f"its plot; here |e| {reached}{settled(settling)}."
     )
 
 

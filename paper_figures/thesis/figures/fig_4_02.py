@@ -19,9 +19,10 @@ TABLES: tuple[str, ...] = ("extended", "extended_summary")
 def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the caption with the numbers of the tables."""
     return (
-        "Controller output and plant input in the run of Fig. 4.1, without anti-windup (thesis Fig. 4.2): (a) "
-        "controller output u, (b) plant input sat(u); dotted: the limits, in the thesis red dashed. "
-        f"{chosen_limit(tables)} |u| reaches {largest(tables['extended']['control_none'])}."
+        "Controller output and plant input in the run of Fig. 4.1 (thesis Fig. 4.2): (a) controller output u, (b) "
+        "plant input sat(u). Beyond the limits (dotted) the scale is logarithmic. Pale range: the signal swings faster "
+        f"than the page can show. {chosen_limit(tables)} |u| reaches "
+        f"{largest(tables['extended']['control_none'])}."
     )
 
 

@@ -8,10 +8,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from paper_figures.look import panels
-from paper_figures.look.captions import largest, last_saturated, of_run, promises
+from paper_figures.look.captions import largest, last_saturated, of_run
 from paper_figures.look.panels import CORRECTED, THESIS
 from paper_figures.look.style import FULL_WIDTH, styled
-from paper_figures.thesis.figures.shared_chapter_4 import beginning, chosen_limit, few_cycles, until
+from paper_figures.thesis.figures.shared_chapter_4 import beginning, few_cycles, limits, until
 
 TABLES: tuple[str, ...] = ("extended", "extended_summary")
 
@@ -25,11 +25,10 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
         for run in ("thesis", "corrected")
     )
     return (
-        "Controller output and plant input in the runs of Fig. 4.3 (thesis Fig. 4.4): (a) controller output u, (b) "
-        "plant input sat(u) and (c) both at the beginning with the thesis's theta1~; (d) to (f) the same with the "
-        "corrected one, which has theta1~(0) = -1; dotted: the limits, in the thesis red dashed. "
-        f"{promises(summary)} The text says that the damaging effects of the saturation are resolved. With the "
-        f"thesis's theta1~ {thesis}; with the corrected one {corrected}. {chosen_limit(tables)}"
+        "Controller output u and plant input sat(u) in the runs of Fig. 4.3 (thesis Fig. 4.4): (a) u with the thesis's "
+        "theta1~, (b) its beginning, (c) a few cycles; (d) to (f) with the corrected one. Beyond "
+        f"{limits(tables)} (dotted) the scale is logarithmic. Pale range: u swings faster than the page can show. With "
+        f"the thesis's theta1~ {thesis}; with the corrected one {corrected}."
     )
 
 

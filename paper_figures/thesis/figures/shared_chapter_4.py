@@ -26,19 +26,25 @@ CYCLES = 6  # of the control are shown one by one
 
 def chosen_limit(tables: Mapping[str, pd.DataFrame]) -> str:
     """Say how the limits, which are not printed, were chosen."""
-    summary = tables["extended_summary"]
-    limit, time_s = (of_run(summary, "none", column) for column in ("limit", "last_saturation_s"))
+    summary, time_s = tables["extended_summary"], of_run(tables["extended_summary"], "none", "last_saturation_s")
     if of_run(summary, "none", "limit_is_given"):
-        return f"Under the given limits of +-{number(limit, 4)} the loop without anti-windup {last_saturated(time_s)}."
+        return f"Under {limits(tables)} the loop without anti-windup {last_saturated(time_s)}."
     target = desaturation(float(tables["extended"]["time_s"].iloc[-1]) / PERIODS)
     printed_s = float(printed_numbers()["extended"]["desaturation_s"])
     when = "at around 4 seconds, as the text says"
     if not math.isclose(target, printed_s, rel_tol=1e-6):
         when = f"at around {duration(target)}, as late in the reference's period as the text says"
     return (
-        f"Chapter 4 prints no limits; +-{number(limit, 4)} are those under which the program finds that the loop "
-        f"without anti-windup leaves saturation {when}: it {last_saturated(time_s)}."
+        f"Chapter 4 prints no limits. Under {limits(tables)} the loop without anti-windup leaves saturation {when}: "
+        f"it {last_saturated(time_s)}."
     )
+
+
+def limits(tables: Mapping[str, pd.DataFrame]) -> str:
+    """Say what the limits are, and whether they were given or chosen."""
+    summary = tables["extended_summary"]
+    whose = "given" if of_run(summary, "none", "limit_is_given") else "chosen"
+    return f"the {whose} limits of +-{number(of_run(summary, 'none', 'limit'), 4)}"
 
 
 def beginning(tables: Mapping[str, pd.DataFrame], *runs: str) -> float:

@@ -55,4 +55,4 @@ def settling(table: pd.DataFrame, run: str) -> str:
 
 def setting(summary: pd.DataFrame) -> str:
     """Say what the thesis leaves open."""
-    return f"The swap and the step of {number(only(summary, 'step'))} are chosen to fit the text; neither is printed."
+    return f"We chose the swap and the step of {number(only(summary, 'step'))} to fit the text."

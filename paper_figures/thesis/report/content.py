@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 import re
-from base64 import b64encode
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -19,27 +18,29 @@ from identification.model.plant import PlantModel
 from identification.output.fit_facts import bound_text
 from paper_figures.look.captions import number
 from paper_figures.summary.of_fit import Paragraph, Table, cautions, paragraphs, parameter_table, plant_table
+from paper_figures.thesis.report.coefficients import coefficient_table
+from paper_figures.thesis.report.embedded import Embedded, embedded, packed
 from paper_figures.thesis.report.inputs import Inputs, Picture, experiment_of
-from paper_figures.thesis.report.ledger import Difference, Row, Verdict, differences, row, verdicts
+from paper_figures.thesis.report.ledger import Consequence, Row, Verdict, consequences, row, verdicts
 from paper_figures.thesis.report.of_designs import DESIGNS, FOLLOWING, loop_table, sentences
 
 PACKAGES = (
     *("antiwindup-thesis", "numpy", "scipy", "control", "slycot", "numba", "pandas", "matplotlib", "sippy-unipi"),
-    *("dask", "pyarrow", "jinja2"),
+    *("dask", "pyarrow", "jinja2", "latex2mathml"),
 )
 """The distributions whose versions are given."""
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure: ``source`` is its picture as a data URI, ``width`` its width in points, or ``refused`` says why not."""
+    """A figure: its picture packed, with its width and height in points; or ``refused`` says why there is none."""
 
     name: str
     label: str
     caption: str
     alt: str
-    source: str
-    width: str
+    picture: str
+    size: tuple[str, str]
     tables: tuple[str, ...]
     synthetic: bool
     refused: str
@@ -47,26 +48,28 @@ class Figure:
 
 @dataclass(frozen=True)
 class DesignPart:
-    """A design in words with its audit, and the sentences of what was refused of it."""
+    """A design in words with its audit and its transfer functions, and the sentences of what was refused of it."""
 
+    name: str
     title: str
     said: str
     audit: str
+    coefficients: Table | None
     refused: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Content:
-    """All that the page says; ``tables`` holds the text of each CSV file, by its name."""
+    """All that the page says; ``tables`` holds what the page has of each CSV file, by its name."""
 
     model: str
     fitted: bool
     synthetic: str
     verdicts: tuple[Verdict, ...]
-    differences: tuple[Difference, ...]
+    consequences: tuple[Consequence, ...]
     rows: tuple[Row, ...]
     figures: tuple[Figure, ...]
-    tables: Mapping[str, str]
+    tables: Mapping[str, Embedded]
     parameters: Table
     basis: tuple[Paragraph, ...]
     loops: Table | None
@@ -92,10 +95,10 @@ def report_content(inputs: Inputs) -> Content:
         fitted=fitted,
         synthetic=f"SYNTHETIC DATA: {synthetic} of {len(inputs.tests)} tests were never measured" if synthetic else "",
         verdicts=tuple(verdicts(inputs.ledger)),
-        differences=tuple(differences(inputs.ledger)),
+        consequences=tuple(consequences(inputs.ledger)),
         rows=tuple(row(claim) for claim in inputs.ledger.to_dict("records")),
         figures=tuple(_figure(inputs, name, fitted and synthetic > 0) for name in inputs.figures),
-        tables=inputs.tables,
+        tables=embedded(inputs.tables),
         parameters=parameter_table(inputs.model) if fitted else _values(inputs.model.plant),
         basis=_basis(inputs) if fitted else _not_fitted(inputs),
         loops=loop_table(made, outcomes),
@@ -132,17 +135,16 @@ def _source(inputs: Inputs, fitted: bool) -> str:
 
 def _figure(inputs: Inputs, name: str, synthetic: bool) -> Figure:
     label, picture, tables = figure_label(name), inputs.figures[name], inputs.figure_tables[name]
-    drawn = isinstance(picture, Picture)
     svg, caption = (picture.svg, picture.caption) if isinstance(picture, Picture) else (b"", "")
-    width = re.search(rb'<svg[^>]*\swidth="([\d.]+)pt"', svg)
+    size = re.search(rb'<svg[^>]*\swidth="([\d.]+)pt"\s+height="([\d.]+)pt"', svg)
     sweeps = any(test.synthetic for test in inputs.tests) and any(t.startswith("additive_error") for t in tables)
     return Figure(
         name,
         label,
         caption,
         f"Fig. {label}: {first_sentence(caption)}",
-        f"data:image/svg+xml;base64,{b64encode(svg).decode()}" if drawn else "",
-        width.group(1).decode() if width else "468",
+        packed(svg),
+        (size[1].decode(), size[2].decode()) if size else ("468", "324"),
         tables,
         sweeps or (synthetic and any(experiment_of(table) for table in tables)),
         "" if isinstance(picture, Picture) else picture,
@@ -172,12 +174,12 @@ def _design(inputs: Inputs, name: str, outcomes: Mapping[str, pd.DataFrame]) -> 
     design, title = inputs.designs[name], DESIGNS[name]
     refused = tuple(said for each in FOLLOWING[name] if isinstance(said := inputs.outcomes.get(each), str))
     if isinstance(design, str):
-        return DesignPart(title, "", "", (design, *refused))
+        return DesignPart(name, title, "", "", None, (design, *refused))
     try:
         found = audit_text(design, audit(design), 1.0)
     except InputError as error:
         raise InputError(f"design_{name}.json: {error}") from None
-    return DesignPart(title, sentences(design, name, outcomes), found, refused)
+    return DesignPart(name, title, sentences(design, name, outcomes), found, coefficient_table(design), refused)
 
 
 def _version(name: str) -> str:

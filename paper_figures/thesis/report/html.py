@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import gzip
+import json
 import re
-from base64 import b64encode
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -13,13 +12,29 @@ from markupsafe import Markup, escape
 
 from identification.base.errors import InputError, printable, printable_lines
 from identification.base.files import write_whole
+from paper_figures.look.style import LINES
 from paper_figures.thesis.report.content import Content
 from paper_figures.thesis.report.inputs import LEDGER
 from paper_figures.thesis.report.ledger import colour
+from paper_figures.thesis.report.typeset import typeset
 
 HERE = Path(__file__).parent
 TEMPLATE = "report.html.j2"
+SCRIPTS = ("report.js", "zoom.js")
 NUMERIC = ("printed", "computed", "tolerance")
+FOLDED = ("quote", "reason", "evidence")
+"""Columns of the ledger that stand folded in its last one."""
+
+LOOKS = {
+    run: str(LINES[kind]["color"])
+    for run, kind in (
+        *(("reference", "reference"), ("none", "without anti-windup"), ("thesis", "thesis anti-windup")),
+        *(("corrected", "corrected anti-windup"), ("back-calculation", "back-calculation")),
+        *(("conditioning", "conditioning"), ("observer", "observer"), ("static", "static")),
+        *(("internal-model", "internal model"), ("weston-postlethwaite", "Weston and Postlethwaite")),
+    )
+}
+"""The colour of each run of a table over time, as the figures have it."""
 
 
 def report_html(content: Content) -> str:
@@ -28,7 +43,7 @@ def report_html(content: Content) -> str:
     Parameters
     ----------
     content
-        All that it says. Each of its tables is embedded once, compressed, and every link to it unpacks that.
+        All that it says. The page holds each of its tables and pictures once, compressed; its script unpacks them.
     """
     environment = Environment(
         loader=FileSystemLoader(HERE),
@@ -38,13 +53,15 @@ def report_html(content: Content) -> str:
         lstrip_blocks=True,
         finalize=lambda value: printable_lines(value) if type(value) is str else value,  # no HTML holds what is not
     )
-    environment.filters.update(packed=_packed, breakable=_breakable, size=file_size, colour=colour)
+    environment.filters.update(breakable=_breakable, size=file_size, colour=colour, typeset=typeset)
     return environment.get_template(TEMPLATE).render(
         content=content,
-        columns=LEDGER,
+        columns=[column for column in LEDGER if column not in FOLDED],
+        folded=FOLDED,
         numeric=NUMERIC,
         css=Markup((HERE / "report.css").read_text(encoding="utf-8")),  # ours, and no user's text in it
-        js=Markup((HERE / "report.js").read_text(encoding="utf-8")),
+        js=Markup("".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)),
+        lines=Markup(json.dumps(LOOKS)),
     )
 
 
@@ -78,8 +95,3 @@ def file_size(text: str) -> str:
 def _breakable(name: str) -> Markup:
     """A name that a line may break in after a dot, a colon, a stroke or an underscore."""
     return Markup("<wbr>").join(escape(part) for part in re.split(r"(?<=[.:/_])", printable(name)))
-
-
-def _packed(text: str) -> str:
-    """The text as UTF-8, compressed, in letters and digits: half its size, and nothing in it is read as HTML."""
-    return b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode()

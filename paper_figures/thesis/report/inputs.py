@@ -27,7 +27,10 @@ from paper_figures.thesis.report.of_designs import FOLLOWING
 
 Kind = TypeVar("Kind")
 
-LEDGER = ("id", "where", "quote", "printed", "computed", "unit", "tolerance", "verdict", "reason", "evidence", "kind")
+LEDGER = (
+    *("id", "where", "printed", "computed", "unit", "tolerance", "verdict", "touches", "kind"),
+    *("quote", "reason", "evidence"),
+)
 """The columns of the ledger that the report shows, in its order."""
 
 KINDS = {"delay_free": "delay-free", "extended": "extended", "robust": "extended"}

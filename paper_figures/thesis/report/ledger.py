@@ -26,7 +26,32 @@ VERDICTS = {
 }
 """The verdicts that are known: the line of the figures whose colour each has, and what it means."""
 
-DIFFERING = ("unchecked", "differs", "not_reproducible")
+CONSEQUENCES = {
+    "conclusion": (
+        "A conclusion of the thesis",
+        "A conclusion does not hold, or nobody can check it: these rows belong to the errata that the errata's first "
+        "paragraph names.",
+    ),
+    "outcome": (
+        "An outcome of a run or of a search",
+        "Another number comes out, or the number depends on something that the thesis does not print. The conclusions "
+        "do not rest on it.",
+    ),
+    "value": (
+        "A printed number of a plant or of a controller",
+        "Other pages of the thesis contradict the number, or it is a misprint or rounding noise. The errata say what "
+        "follows.",
+    ),
+    "derivation": (
+        "A step of a derivation",
+        "A premise, a formula or a reason is not right as printed. The errata say for each what still stands.",
+    ),
+    "nothing": ("Nothing", "No result of the thesis uses it: a year of the literature, a block that is 1."),
+    "": ("Not yet judged", "The ledger does not say what these rows touch."),
+}
+"""What a row that does not agree touches, the gravest first: the ledger's word, its heading and its meaning."""
+
+DIFFERING = ("differs", "not_reproducible", "unchecked")
 """The verdicts that stand up front with their reasons."""
 
 STATEMENT = "true"
@@ -55,6 +80,17 @@ class Difference:
 
 
 @dataclass(frozen=True)
+class Consequence:
+    """One of :data:`CONSEQUENCES` and what touches it; ``count`` is the number of rows."""
+
+    name: str
+    title: str
+    meaning: str
+    count: int
+    differences: tuple[Difference, ...]
+
+
+@dataclass(frozen=True)
 class Cell:
     """A cell of the ledger: its column, its text, and the number it is sorted by, if any."""
 
@@ -69,6 +105,7 @@ class Row:
 
     cells: tuple[Cell, ...]
     verdict: str
+    touches: str
     kind: str
     chapter: str
 
@@ -100,18 +137,34 @@ def verdicts(ledger: pd.DataFrame) -> Iterator[Verdict]:
             yield Verdict(name, int(counts[name]), meaning, colour(name))
 
 
-def differences(ledger: pd.DataFrame) -> Iterator[Difference]:
-    """What does not agree, one for each reason, in the order of the ledger."""
-    for verdict in DIFFERING:
-        for reason, claims in ledger[ledger["verdict"] == verdict].groupby("reason", sort=False):
-            numbers = claims.assign(computed=[_computed(claim) for claim in claims.to_dict("records")])
-            yield Difference(
-                verdict,
-                str(reason),
-                tuple(numbers[["id", "where", "printed", "computed", "unit"]].itertuples(index=False, name=None)),
-                tuple(dict.fromkeys(claims["quote"])),
-                tuple(dict.fromkeys(" ".join(claims["evidence"]).split())),
-            )
+def consequences(ledger: pd.DataFrame) -> Iterator[Consequence]:
+    """What does not agree by what it touches, the gravest first; within that one for each reason, as in the ledger.
+
+    Raises
+    ------
+    InputError
+        The column ``touches`` holds a word that is not one of :data:`CONSEQUENCES`.
+    """
+    if unknown := set(ledger["touches"]) - set(CONSEQUENCES):
+        expected = ", ".join(filter(None, CONSEQUENCES))
+        raise InputError(f"the ledger has {', '.join(sorted(unknown))} in the column touches; expected {expected}")
+    differing = ledger[ledger["verdict"].isin(DIFFERING)]
+    for name, (title, meaning) in CONSEQUENCES.items():
+        rows = differing[differing["touches"] == name]
+        if len(rows):
+            yield Consequence(name, title, meaning, len(rows), tuple(_differences(rows)))
+
+
+def _differences(rows: pd.DataFrame) -> Iterator[Difference]:
+    for (verdict, reason), claims in rows.groupby(["verdict", "reason"], sort=False):
+        numbers = claims.assign(computed=[_computed(claim) for claim in claims.to_dict("records")])
+        yield Difference(
+            str(verdict),
+            str(reason),
+            tuple(numbers[["id", "where", "printed", "computed", "unit"]].itertuples(index=False, name=None)),
+            tuple(dict.fromkeys(claims["quote"])),
+            tuple(dict.fromkeys(" ".join(claims["evidence"]).split())),
+        )
 
 
 def row(claim: Mapping[Hashable, str]) -> Row:
@@ -121,7 +174,7 @@ def row(claim: Mapping[Hashable, str]) -> Row:
         shown["tolerance"] = ""
     values = {"printed": _value(claim["printed"]), "computed": claim["computed"], "tolerance": claim["tolerance"]}
     cells = tuple(Cell(column, shown[column], values.get(column, "")) for column in LEDGER)
-    return Row(cells, claim["verdict"], claim["kind"], chapter_of(claim["where"]))
+    return Row(cells, claim["verdict"], claim["touches"], claim["kind"], chapter_of(claim["where"]))
 
 
 def _value(printed: str) -> str:
