@@ -160,6 +160,21 @@ def write_command_pages(app: Sphinx) -> None:
     write("antiwindup", main)
 
 
+def link_to_source(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Let a link to a module of a room lead to its page of source, and not to a file to download."""
+    from docutils.nodes import reference
+    from sphinx.addnodes import download_reference
+
+    for node in list(doctree.findall(download_reference)):
+        file = (Path(app.srcdir, docname).parent / node["reftarget"]).resolve()
+        place = (
+            file.relative_to(ROOT).with_suffix("").as_posix().removesuffix("/__init__") if ROOT in file.parents else ""
+        )
+        if file.suffix == ".py" and place.partition("/")[0] in ROOMS and app.builder.format == "html":
+            uri = app.builder.get_relative_uri(docname, f"_modules/{place}")
+            node.replace_self(reference("", "", *node.children, refuri=uri, internal=True))
+
+
 def setup(app: Sphinx) -> None:
     """Register what this file adds to Sphinx."""
     app.connect("builder-inited", write_api_pages)
@@ -169,6 +184,7 @@ def setup(app: Sphinx) -> None:
         app.connect(f"sphinx-click-process-{part}", without_substitutions)
     app.connect("sphinx-click-process-options", whole_metavars)
     app.connect("autodoc-skip-member", of_others)
+    app.connect("doctree-resolved", link_to_source)
     app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
 
 
