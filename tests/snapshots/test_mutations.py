@@ -14,6 +14,7 @@ from drawn import artists_of, drawn, drawn_axes
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import Collection, QuadMesh
+from matplotlib.contour import ContourSet
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Polygon, Rectangle, StepPatch
@@ -131,7 +132,7 @@ def test_every_change_of_a_drawing_is_caught(name: str) -> None:
             artist.set_visible(False)
             assert panel.is_noticed(), f"{artist} hidden"
             artist.set_visible(True)
-            if not isinstance(artist, Patch):  # whose faces and edges do not come back
+            if not isinstance(artist, ContourSet | Patch):  # whose faces and edges do not come back
                 alpha = artist.get_alpha()
                 artist.set_alpha(0.05)
                 assert panel.is_noticed(), f"{artist} pale"
