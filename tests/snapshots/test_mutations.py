@@ -13,7 +13,7 @@ import pytest
 from drawn import artists_of, drawn, drawn_axes
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import Collection, QuadMesh
+from matplotlib.collections import Collection
 from matplotlib.contour import ContourSet
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
@@ -86,9 +86,6 @@ def moved(artist: Artist) -> Iterator[Callable[[float], object]]:
     elif isinstance(artist, Text):
         at = artist.get_position()
         yield lambda factor: artist.set_position((factor * at[0], factor * at[1]))
-    elif isinstance(artist, QuadMesh):
-        values = np.ma.asarray(artist.get_array(), dtype=float)
-        yield lambda factor: artist.set_array(values * factor)
     elif isinstance(artist, Collection):
         for path in artist.get_paths():
             corners = np.array(path.vertices)
