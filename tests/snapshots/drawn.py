@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.collections import Collection, QuadMesh
+from matplotlib.collections import Collection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
@@ -118,9 +118,6 @@ def _artist(artist: Artist) -> tuple[str, dict[str, np.ndarray]]:
         look = f"{to_hex(artist.get_color())} {artist.get_fontsize():g}"
         look += f" {artist.get_horizontalalignment()} {artist.get_verticalalignment()}"
         return f"{artist.get_text()!r} at {x:.3f} {y:.3f} {look} {artist.get_rotation():g}", at
-    if isinstance(artist, QuadMesh):
-        mesh = {"mesh": np.asarray(artist.get_coordinates()).ravel()}
-        return "", mesh | {"values": np.ma.asarray(artist.get_array(), dtype=float).ravel()}
     if isinstance(artist, Collection):
         paths = artist.get_paths()
         corners = np.concatenate([np.asarray(path.vertices).ravel() for path in paths])

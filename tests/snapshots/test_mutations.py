@@ -13,7 +13,8 @@ import pytest
 from drawn import artists_of, drawn, drawn_axes
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import Collection, QuadMesh
+from matplotlib.collections import Collection
+from matplotlib.contour import ContourSet
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Polygon, Rectangle, StepPatch
@@ -85,9 +86,6 @@ def moved(artist: Artist) -> Iterator[Callable[[float], object]]:
     elif isinstance(artist, Text):
         at = artist.get_position()
         yield lambda factor: artist.set_position((factor * at[0], factor * at[1]))
-    elif isinstance(artist, QuadMesh):
-        values = np.ma.asarray(artist.get_array(), dtype=float)
-        yield lambda factor: artist.set_array(values * factor)
     elif isinstance(artist, Collection):
         for path in artist.get_paths():
             corners = np.array(path.vertices)
@@ -131,7 +129,7 @@ def test_every_change_of_a_drawing_is_caught(name: str) -> None:
             artist.set_visible(False)
             assert panel.is_noticed(), f"{artist} hidden"
             artist.set_visible(True)
-            if not isinstance(artist, Patch):  # whose faces and edges do not come back
+            if not isinstance(artist, ContourSet | Patch):  # whose faces and edges do not come back
                 alpha = artist.get_alpha()
                 artist.set_alpha(0.05)
                 assert panel.is_noticed(), f"{artist} pale"
