@@ -121,7 +121,7 @@ def test_the_nearest_points_of_the_page_miss_by_what_it_says(row: tuple[str, ...
     assert set(values) == {axis.name for axis in case.axes}
     assert all(axis.low <= values[axis.name] <= axis.high for axis in case.axes)
     again = Tried(case, np.zeros(0), values, case.outcomes("none", values, 700) | case.outcomes("thesis", values, 700))
-    assert 100 * again.miss(converging=False) == pytest.approx(float(miss.split()[0]), abs=0.3)
+    assert 100 * again.miss(converging=False) == pytest.approx(float(miss.split()[0]), abs=0.5)
     assert again.outcomes["final_error_percent"] == pytest.approx(float(final.split()[0]), rel=0.05, abs=0.01)
     assert again.outcomes["final_error_percent"] < CONVERGED_PERCENT or error == "any"
 
