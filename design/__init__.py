@@ -1,4 +1,4 @@
-"""Plant model and additive bound -> the controllers of chapters 2 and 3 with their anti-windup.
+"""Plant model and additive bound -> the controllers of chapters 2 to 4 with their anti-windup.
 
 >>> import design, identification
 >>> Mode = identification.Mode

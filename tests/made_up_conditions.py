@@ -32,7 +32,7 @@ def made_up_conditions() -> dict[str, pd.DataFrame]:
                 under = {"set": name, "delay": delay, "initial_output": output}
                 for limit in limits[:: 3 if delay == "pade" else 1]:
                     values = {"error_after_1s": 200 / limit + k, "desaturation_s": 50 / limit + k}
-                    values |= {"recovery_saturation_s": 30 / limit, "recovery_to_offset_s": np.nan}
+                    values |= {"recovery_saturation_s": 30 / limit, "recovery_to_offset_s": 90 / limit}
                     rows.append({"case": "extended", "required": 10.5, "limit": limit} | under | values)
                 span = {"met": 1, "limit_low": 19.25, "limit_high": 19.375, "limit": 19.3125 + (delay == "pade") / 64}
                 alone.append(row("alone", "error", "error_after_1s", **(under | span)))
@@ -42,7 +42,7 @@ def made_up_conditions() -> dict[str, pd.DataFrame]:
                 if output == 0.0:
                     alone[-1] |= {"limit": np.nan, "computed": np.nan}
         under = {"set": name, "delay": "none", "initial_output": 0.0}
-        for limit in (9.5, 10.5, 10.0):
+        for limit in (9.0, 11.0, 10.0):
             values = {"limit": limit, "weights": "usual", "peak_percent": 10.0 ** (10 - limit)}
             rows.append({"case": "delay_free", "required": 11.0} | under | values)
         alone.append(
@@ -55,11 +55,11 @@ def made_up_conditions() -> dict[str, pd.DataFrame]:
         )
         for search, miss in (("together", 0.1875), ("together, converging", 0.75)):
             joint = {"set": name, "delay": "exact", "initial_output": 61.5, "limit": 10.625, "worst_miss": miss + k / 8}
-            for outcome, reading in (
-                ("error", "error_overall"),
-                ("desaturation", "desaturation_s"),
-                ("recovery", "recovery_1_s"),
+            for outcome, reading, ratio in (
+                ("error", "error_overall", 1.125),
+                ("desaturation", "desaturation_s", 0.5),
+                ("recovery", "recovery_1_s", 0.75),
             ):
-                computed = PRINTED[outcome][0] * 1.125
+                computed = PRINTED[outcome][0] * ratio
                 alone.append(row(search, outcome, reading, **joint, computed=computed, final_error_percent=37.0))
     return {"conditions": pd.DataFrame(rows), "conditions_summary": pd.DataFrame(alone)}

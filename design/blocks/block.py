@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from identification.base.arrays import Complex
 from identification.base.errors import InputError, shown
-from identification.base.json_object import number
+from identification.base.json_object import number, numbers
 from identification.model.additive_bound import AdditiveBound
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
@@ -130,14 +130,21 @@ class Block:
         try:
             return cls(
                 number(content, "gain"),
-                tuple(complex(real, imag) for real, imag in content["zeros"]),
-                tuple(complex(real, imag) for real, imag in content["poles"]),
+                _listed(content, "zeros"),
+                _listed(content, "poles"),
                 number(content, "delay_s"),
             )
         except InputError:
             raise
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise InputError(f"a block is not of the form gain, zeros, poles, delay_s ({error})") from None
+
+
+def _listed(content: Mapping[str, Any], key: str) -> tuple[complex, ...]:
+    """The roots at ``key``, a list of pairs of numbers."""
+    if not isinstance(content[key], list):
+        raise InputError(f"{key} is {shown(content[key])}; expected a list of pairs of numbers")
+    return tuple(complex(real, imag) for real, imag in (numbers({key: root}, key) for root in content[key]))
 
 
 def mode_product(gain: float, modes: Iterable[Mode], rates: Iterable[float] = ()) -> Block:

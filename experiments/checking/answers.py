@@ -167,14 +167,13 @@ def _parameters(found: ModelCheck, sweep: SweepCheck) -> tuple[Outcome, str]:
     first, open_moves = largest[0], [move for move in largest if move.is_open]
     if open_moves and not new:
         words = ", ".join(
-            f"{named(move.parameter)} differs {_by(move)}, and a move of it is told from {found_from(move)} on"
-            for move in open_moves[:NAMED]
+            f"{named(move.parameter)} differs {_by(move)}, and {_least(move)}" for move in open_moves[:NAMED]
         )
         tests = f"{len(record.tests)} test{'s are' if len(record.tests) > 1 else ' is'}"
         return Outcome.OPEN, f"{tests} too few to tell whether a parameter moved: {words}"
     none = "no parameter moved by more than chance"
     none += f"; {named(first.parameter)}, which differs {_by(first)}, comes nearest to a move"
-    none += f", told from {found_from(first)} on" if first.could_be_told else ""
+    none += f" ({_least(first)})" if first.could_be_told else ""
     rest = [f"of {untold} of the {len(sweep.moves)} parameters no move could be told"] if untold else []
     return Outcome.MOVED if new else Outcome.HOLDS, "; ".join([*([new] if new else []), none, *rest])
 
@@ -209,6 +208,12 @@ def found_from(move: Move) -> str:
     if not move.parameter.value:
         return f"{1e3 * move.found_from:.2g} ms"
     return relative(move.found_from)[1:] if move.could_be_told else "never"
+
+
+def _least(move: Move) -> str:
+    if not move.could_be_told:
+        return "no move of it could be told"
+    return f"only a move of {found_from(move)} or more could be told"
 
 
 def _also(move: Move) -> str:

@@ -41,7 +41,7 @@ def first_sentence(found: ModelCheck) -> str:
     after = _design_keeps(held)
     if Outcome.MOVED in outcomes and found.model.fit is not None and len(found.model.fit.tests) == 1:
         after += ["the model's single test does not say how much tests of one plant differ"]
-    after += ["whether a design may stay, --against says"] if found.promise is None else []
+    after += ["--against DESIGN tells whether a design may stay"] if found.promise is None else []
     return f"{todo}: {'; '.join([*failed.values(), *after])}"
 
 

@@ -85,8 +85,10 @@ def comparison(tables: Mapping[str, pd.DataFrame], words: Mapping[str, str]) -> 
         chosen = (runs["time_s"] >= begin) & (runs["time_s"] <= begin + SHOWN * half)
         _distances(axes[above], runs[chosen], begin, amplitude, words)
         _measures(axes[below], table[table["upset"] == upset], words)
-    for letter in "bd":
-        axes[letter].set_ylabel("")
+    top = max(axes[letter].get_ylim()[1] for letter in "ab")
+    for letter in "ab":
+        axes[letter].set_ylim(top=top)
+    axes["b"].set_ylabel("")
     handles = axes["a"].get_legend_handles_labels()
     middle = (len(handles[0]) + 1) // 2
     for letter, part in (("a", slice(middle)), ("b", slice(middle, None))):

@@ -148,4 +148,5 @@ def _over_distance(panel: Axes, table: pd.DataFrame, runs: Sequence[str], view: 
         line = LINES[look_of(run)]
         fill = {"fill": True, "facecolor": to_rgba(line["color"], 0.3), "edgecolor": line["color"]}
         panel.stairs(greatest, edges, baseline=least, **fill, linewidth=0.8, zorder=2 + order / 10)
-    panel.set(xlabel="Distance from the model [-]", xlim=(0, 1), ylim=view)
+    nearest = float(table["from"][table["plants"] > 0].min())
+    panel.set(xlabel="Distance from the model [-]", xlim=(nearest, 1), ylim=view)

@@ -93,9 +93,9 @@ def curves(
         bottom = max(forced / 2, top / 10 ** (2 * DECADES))
     lower, upper = (table[f"{floor}_{end}"].clip(lower=bottom / 10**DECADES) for end in ("lower", "upper"))
     panel.fill_between(x, bottom / 10**DECADES, lower, color=GREY, linewidth=0)
-    panel.plot(x, upper, **FLOOR)
+    panel.plot(x, upper, **FLOOR, zorder=3)
     for column, look in errors.items():
-        panel.plot(x, table[column], **look)
+        panel.plot(x, table[column], **look, zorder=3 - look.get("linewidth", 0.0) / 10)
     panel.set(yscale="log", ylim=(bottom, top))
     if len(x) > 1:
         seen = x[np.any([upper > bottom, *(~(table[column] <= bottom) for column in errors)], axis=0)]

@@ -127,7 +127,8 @@ def over_rate(panel: Axes, table: pd.DataFrame, runs: Sequence[str]) -> None:
     for order, run in enumerate(runs):
         line = LINES[look_of(run)]
         own = table[table["run"] == run]
-        panel.plot(ends, [continuous_error(table, run)] * 2, **panels.band(line))
+        band = panels.band(line)
+        panel.plot(ends, [continuous_error(table, run)] * 2, **band, zorder=2 - band["linewidth"] / 10)
         for method, (_, marker) in known.items():
             rows = own[own["method"] == method]
             face = "#FFFFFF" if method == "exact" else line["color"]

@@ -30,6 +30,7 @@ RULES = {
     "is of a kind": lambda row: row["kind"] in KINDS,
     "has a status": lambda row: row["status"] in STATUSES,
     "is unchecked without a function": lambda row: (row["status"] == "unchecked") == (row["compute"] == ""),
+    "says what it touches unless it agrees": lambda row: bool(row["touches"]) != (row["status"] in {"agrees", "input"}),
     "gives a reason unless it agrees": lambda row: row["reason"] or row["status"] in {"agrees", "input"},
     # inputs are transcribed, never reproduced: they can only be contradicted
     "is an input if its status is": lambda row: row["kind"] == "input" or row["status"] != "input",

@@ -99,8 +99,8 @@ class Page(HTMLParser):
         Of the ledger, each as a dictionary from the name of the column to the text.
     pictures
         Attributes of each <img>.
-    tables
-        Name and text of each embedded table, as it stands in the page.
+    tables, svgs
+        Name and text of each embedded table and picture, as it stands in the page.
     ids
         Every id.
     text
@@ -112,10 +112,12 @@ class Page(HTMLParser):
         self.rows: list[dict[str, str]] = []
         self.pictures: list[dict[str, str | None]] = []
         self.tables: list[tuple[str, str]] = []
+        self.svgs: list[tuple[str, str]] = []
         self.ids: list[str] = []
         self.text = ""
         self._inside: list[str] = []
-        self._cell = ""
+        self._cell = self._tag = ""
+        self._held: list[tuple[str, str]] | None = None
         self.feed(html)
         self.close()
 
@@ -128,26 +130,29 @@ class Page(HTMLParser):
             self.pictures.append(given)
         if tag in ("script", "style"):
             self._inside.append(tag)
-            if tag == "script" and given.get("class") == "table":
-                self.tables.append((given["data-table"] or "", ""))
+            self._held = {"table": self.tables, "svg": self.svgs}.get(given.get("class") or "")
+            if self._held is not None:
+                self._held.append((given.get("data-table") or given.get("data-picture") or "", ""))
         if tag == "tr" and "data-verdict" in given:
             self.rows.append({})
-        if tag == "td":
-            self._cell = given.get("data-label") or ""
+        if "data-label" in given:
+            self._cell, self._tag = given["data-label"] or "", tag
+        if self._cell == "quote" and "data-source" in given:
+            self.rows[-1]["quote"] = given["data-source"] or ""
 
     def handle_endtag(self, tag: str) -> None:
         """Note what ends."""
         if tag in ("script", "style"):
             self._inside.pop()
-        if tag == "td":
+        if tag == self._tag:
             self._cell = ""
 
     def handle_data(self, data: str) -> None:
         """Note the text."""
         if self._inside:
-            if self._inside[-1] == "script" and self.tables and not self.tables[-1][1]:
-                self.tables[-1] = (self.tables[-1][0], data)
+            if self._inside[-1] == "script" and self._held is not None:
+                self._held[-1] = (self._held[-1][0], data)
             return
         self.text += data
-        if self._cell:
+        if self._cell not in ("", "quote"):
             self.rows[-1][self._cell] = self.rows[-1].get(self._cell, "") + data

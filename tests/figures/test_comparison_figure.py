@@ -37,7 +37,7 @@ def test_a_marker_says_recovery_control_and_guarantee() -> None:
     [
         ("recovery_s", "Never recovered: thesis anti-windup."),
         ("refused", "Not possible for this plant: internal model."),
-        ("least_peak_error", "From 1.38 s after the start on every controller leaves an error |r - y| of 2.62 m"),
+        ("least_peak_error", "From 1.38 s on every controller leaves an error |r - y| of 2.62"),
     ],
 )
 def test_the_caption_says_the_numbers(column: str, said: str) -> None:

@@ -47,7 +47,7 @@ def test_chapter_2_is_drawn_in_the_order_of_the_limits(tables: Tables) -> None:
         for line in panel.lines
         if line.get_color() == LINES["thesis anti-windup"]["color"] and len(np.asarray(line.get_xdata())) == 3
     ]
-    np.testing.assert_array_equal(np.asarray(line.get_xdata()), [9.5, 10.0, 10.5])
+    np.testing.assert_array_equal(np.asarray(line.get_xdata()), [9.0, 10.0, 11.0])
 
 
 def test_the_joint_panel_shows_computed_over_printed(tables: Tables) -> None:
@@ -56,7 +56,7 @@ def test_the_joint_panel_shows_computed_over_printed(tables: Tables) -> None:
     dots = [values for values in dots if len(values)]
     assert len(dots) == 4
     for values in dots:
-        np.testing.assert_allclose(values, 1.125)
+        np.testing.assert_allclose(values, [1.125, 0.5, 0.75])
 
 
 def test_the_caption_says_the_numbers(tables: Tables) -> None:

@@ -595,8 +595,8 @@ def test_the_real_drive():
         "limits +-13.5 in 4096 steps, 12.5 ms across",
         "the drive at 1.28 kHz",
         "settles in 6.75 s and settles in 7.5 s",
-        "at 0.32 kHz to 5.12 kHz: 0.125 to 0.00781 m with held inputs, 0.0156 to 6.1e-05 m with Tustin's rule",
-        "17.3 m, stays.",
+        "at 0.32 kHz to 5.12 kHz: 0.125 to 0.00781 with held inputs, 0.0156 to 6.1e-05 with Tustin's rule",
+        "17.3, stays.",
     ):
         assert said in caption
     assert "ivergent" not in caption
@@ -617,7 +617,7 @@ def test_a_drive_that_diverges_is_counted(as_pdf):
     figure = fig_a_05.draw(tables)
     assert 10 < figure.axes[0].get_ylim()[1] < 1e4
     assert "and does not settle within the run." in fig_a_05.caption(tables)
-    assert "unbounded to unbounded m with held inputs" in fig_a_05.caption(tables)
+    assert "unbounded to unbounded with held inputs" in fig_a_05.caption(tables)
     as_pdf(figure)
 
 
@@ -634,8 +634,8 @@ def test_the_drift():
     for said in (
         "at 0.64 kHz by Tustin's rule, in 5120 s",
         "to multiples of 0.00659 (1/2^12 of the range",
-        "ends at -6.12 m (at most 6.25); half a step makes -K (step/2) t = -6.5 m",
-        "ends at -0.00275 m (at most 0.003).",
+        "ends at -6.12 (at most 6.25); half a step makes -K (step/2) t = -6.5",
+        "ends at -0.00275 (at most 0.003).",
     ):
         assert said in caption
 

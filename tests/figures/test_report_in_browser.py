@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, expect
 from report_build import BREAKING_OUT, FIGURES, SWEEPS, copied_build, report
 
@@ -50,6 +51,23 @@ class Watched:
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.on("requestfailed", lambda request: self.complaints.append(f"failed: {request.url}"))
         self.page.goto(address)
+        if settings.get("java_script_enabled", True):
+            self.page.wait_for_function("document.querySelectorAll('img:not([src])').length === 0")
+
+    def show_all(self) -> None:
+        """Show every row of the ledger, which at first shows what differs."""
+        self.page.get_by_role("button", name="Show all").click()
+
+    def violations(self) -> list[str]:
+        """What axe-core objects to in both themes."""
+        found = []
+        for theme in ("light", "dark"):
+            self.page.emulate_media(color_scheme=theme)
+            found += [
+                f"{theme}: {each['id']}, {each['nodes'][0]['html']}"
+                for each in Axe().run(self.page).response["violations"]
+            ]
+        return found
 
     def shown(self) -> list[str]:
         """The ids of the rows of the ledger that are shown, in their order."""
@@ -72,8 +90,9 @@ def desk_page(browser: Browser, address: str) -> Iterator[Watched]:
 @pytest.fixture
 def watched(desk_page: Watched, ledger: pd.DataFrame) -> Iterator[Watched]:
     """One page for all tests, since it takes a second to load: each finds it with every row and leaves it so."""
+    desk_page.show_all()
     yield desk_page
-    desk_page.page.get_by_role("button", name="Show all").click()
+    desk_page.show_all()
     desk_page.counts(f"{len(ledger)} of {len(ledger)} rows")
     assert not desk_page.complaints
 
@@ -93,7 +112,7 @@ def phone(phone_page: Watched) -> Iterator[Watched]:
 
 def searched(ledger: pd.DataFrame, *asked: str) -> pd.Series:
     """Whether the text of each row holds all the words."""
-    columns = ["id", "where", "quote", "printed", "unit", "kind", "verdict", "reason", "evidence"]
+    columns = ["id", "where", "quote", "printed", "unit", "kind", "touches", "verdict", "reason", "evidence"]
     text = ledger[columns].agg("\n".join, axis=1).str.lower()
     found = pd.Series(True, index=ledger.index)
     for word in asked:
@@ -103,7 +122,7 @@ def searched(ledger: pd.DataFrame, *asked: str) -> pd.Series:
 
 def test_loads_without_a_request_or_a_complaint(watched: Watched, address: str) -> None:
     watched.page.wait_for_load_state("networkidle")
-    assert {url.partition("#")[0] for url in watched.requests if not url.startswith("data:")} == {address}
+    assert {url.partition("#")[0] for url in watched.requests if not url.startswith(("data:", "blob:"))} == {address}
     assert watched.page.title().startswith("Report")
 
 
@@ -126,7 +145,7 @@ def test_each_filter_shows_exactly_its_rows(watched: Watched, ledger: pd.DataFra
         expected = list(ledger["id"][ledger[column] == value])
         watched.counts(f"{len(expected)} of {len(ledger)} rows")
         assert watched.shown() == expected
-    watched.page.get_by_role("button", name="Show all").click()
+    watched.show_all()
     watched.counts(f"{len(ledger)} of {len(ledger)} rows")
     assert watched.shown() == list(ledger["id"])
 
@@ -236,7 +255,12 @@ def test_a_phone_shows_all_without_scrolling_sideways(phone: Watched, ledger: pd
     boxes = """() => [...document.querySelectorAll("table")].map((table) => table.closest(".box")).map((box) =>
         [box.getBoundingClientRect().right <= innerWidth, box.scrollWidth, box.clientWidth,
          getComputedStyle(box).overflowX])"""
+    differing = list(ledger["id"][ledger["verdict"] == "differs"])
+    assert phone.shown() == differing
+    height = phone.page.evaluate("document.documentElement.scrollHeight")
+    phone.show_all()
     assert phone.shown() == list(ledger["id"])
+    assert phone.page.evaluate("document.documentElement.scrollHeight") - height < 200 * (len(ledger) - len(differing))
     for inside, scroll, client, overflow in phone.page.evaluate(boxes):
         assert inside
         assert scroll <= client or overflow == "auto"
@@ -248,7 +272,8 @@ def test_letters_are_large_enough_on_a_phone(phone: Watched) -> None:
         const sizes = [];
         for (let node = walker.nextNode(); node; node = walker.nextNode()) {
             const element = node.parentElement;
-            if (node.data.trim() && element.checkVisibility())
+            const small = Number(getComputedStyle(element).mathDepth) > 0;  // an index or an exponent
+            if (node.data.trim() && element.checkVisibility() && !small)
                 sizes.push([parseFloat(getComputedStyle(element).fontSize) * visualViewport.scale, node.data.trim()]);
         }
         return sizes; }"""
@@ -264,15 +289,66 @@ def test_without_scripts_all_rows_are_there(browser: Browser, address: str, ledg
     assert rows.last.is_visible()
     watched.counts(f"{len(ledger)} of {len(ledger)} rows")
     assert not watched.page.locator("#filter").is_visible()
-    assert watched.page.get_by_text("need JavaScript to be saved").is_visible()
-    assert watched.page.locator("img").first.is_visible()
+    assert watched.page.get_by_text("needs JavaScript to show them").is_visible()
     watched.context.close()
+
+
+def test_runs_over_time_are_zoomed_by_keys_and_buttons(watched: Watched) -> None:
+    page, rows = watched.page, "".join(f"{0.01 * k:.2f},{k},{-k}\n" for k in range(1001))
+    page.evaluate(
+        """async (text) => {
+            tables.set("made", new TextEncoder().encode(text).buffer);
+            const part = document.createElement("details");
+            [part.className, part.open, part.dataset.table] = ["zoom", true, "made"];
+            document.getElementById("figures").append(part);
+            await zoomable(part);
+        }""",
+        f"# a remark\ntime_s,reference,output_none\n{rows}",
+    )
+    canvas, said = page.get_by_label("made: output"), page.locator(".zoom output")
+    canvas.press("+")
+    expect(said).to_have_text("2.5 s to 7.5 s")
+    canvas.press("ArrowRight")
+    expect(said).to_have_text("3 s to 8 s")
+    canvas.press("0")
+    expect(said).to_have_text("0 s to 10 s")
+    canvas.hover(position={"x": 100, "y": 50})
+    page.mouse.wheel(0, -100)
+    expect(said).to_contain_text("reference")
+    page.mouse.move(0, 0)
+    page.get_by_role("button", name="Zoom in").click()
+    page.get_by_role("button", name="Whole run").click()
+    expect(said).to_have_text("0 s to 10 s")
+    assert page.get_by_role("checkbox", name="none").is_checked()
 
 
 def test_fields_and_count_are_named_for_those_who_cannot_see(watched: Watched) -> None:
     for name in ("Verdict", "Kind", "Chapter"):
         assert watched.page.get_by_role("combobox", name=name).count() == 1
     assert watched.page.get_by_role("searchbox", name="Search").count() == 1
-    assert watched.page.get_by_role("table").count() >= 3
+    assert watched.page.get_by_role("table").count() >= 2
     assert watched.page.locator("#count").get_attribute("aria-live") == "polite"
     assert watched.page.get_by_role("columnheader", name="verdict").count() == 1
+    assert not watched.violations()
+
+
+def test_a_phone_is_as_accessible_and_its_contents_are_a_menu(phone: Watched) -> None:
+    menu = phone.page.get_by_role("navigation", name="Contents")
+    link = menu.get_by_role("link", name="The ledger")
+    assert not link.is_visible()
+    menu.get_by_text("Contents", exact=True).tap()
+    assert not phone.violations()
+    link.tap()
+    assert not link.is_visible()
+    assert phone.page.evaluate("Math.abs(document.getElementById('ledger').getBoundingClientRect().top) < 100")
+
+
+def test_on_paper_every_row_is_there_and_nothing_is_folded(watched: Watched, ledger: pd.DataFrame) -> None:
+    watched.page.locator("select[name=verdict]").select_option("differs")
+    watched.page.emulate_media(media="print")
+    watched.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert sorted(watched.shown()) == sorted(ledger["id"])
+    assert watched.page.locator("main details:not([open]):not(.zoom)").count() == 0
+    assert not watched.page.get_by_role("navigation").is_visible()
+    watched.page.evaluate("dispatchEvent(new Event('afterprint'))")
+    watched.page.emulate_media(media="screen")

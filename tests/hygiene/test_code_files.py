@@ -127,7 +127,11 @@ def test_no_file_is_forgotten(opened: dict[str, set[str]]) -> None:
     ("module", "needed", "command"),
     [
         ("experiments/thesis/commands.py", "experiments/thesis/studies/pid.py", "experiments thesis pid"),
-        ("paper_figures/thesis/figures/fig_4_01.py", "paper_figures/look/panels.py", "paper_figures draw fig_4_01"),
+        (
+            "paper_figures/thesis/figures/fig_2_02.py",
+            "paper_figures/thesis/figures/shared_pid.py",
+            "paper_figures draw fig_2_02",
+        ),
     ],
 )
 def test_a_forgotten_file_is_found(

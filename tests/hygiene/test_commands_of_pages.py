@@ -12,7 +12,7 @@ import pytest
 from antiwindup.__main__ import main
 
 ROOT = Path(__file__).resolve().parents[2]
-SHELL = re.compile(r"^```(?:sh|bash|console)?\n(.*?)^```", flags=re.MULTILINE | re.DOTALL)
+SHELL = re.compile(r"^```(?:sh|bash|console)\n(.*?)^```", flags=re.MULTILINE | re.DOTALL)
 FILE = re.compile(r".+\.[a-z]\w*$")
 
 
@@ -21,8 +21,8 @@ def commands_of(page: Path) -> list[list[str]]:
     found = []
     for block in SHELL.findall(page.read_text(encoding="utf-8")):
         for line in block.replace("\\\n", " ").splitlines():
-            command = line.strip().removeprefix("$P -m ").removeprefix("python -m ")
-            is_room = command != line.strip()
+            command = line.partition("||")[0].strip().removeprefix("$P -m ").removeprefix("python -m ")
+            is_room = not line.strip().startswith(command)
             if is_room or command.startswith("antiwindup "):
                 words = shlex.split(command, comments=True)
                 found.append(words if is_room and words[0] != "antiwindup" else words[1:])

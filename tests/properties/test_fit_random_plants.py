@@ -43,7 +43,7 @@ def test_random_plant(band_hz: tuple[float, float], pairs: int, spacing: Callabl
     lines, has mean p/2 and is below 2 p + 10 with a probability of 0.9999 or more.
     """
     rng = np.random.default_rng([pairs, int(band_hz[1]), spacing is np.linspace])
-    omega = 2 * np.pi * spacing(*band_hz, 300)
+    omega = 2 * np.pi * spacing(*band_hz, 200)
     plant = _plant(rng, omega, pairs)
     exact = plant(1j * omega)
     sigma = np.hypot(rng.uniform(0.01, 0.1) * np.abs(exact), 0.01 * np.median(np.abs(exact)))

@@ -62,7 +62,11 @@ def made_up_limits() -> dict[str, pd.DataFrame]:
     periodic = {"limit": limit, "required": 11.5, "periodic_lower": 12 / limit - 0.9, "periodic_upper": 12 / limit}
     periodic |= {f"peak_{run}": np.where(limit < 6 + times, np.nan, times * 12 / limit) for run, times in runs.items()}
     made_up = {"limits_extended_summary": pd.DataFrame(rest), "limits_delay_free": pd.DataFrame(periodic)}
-    return made_up | {name: pd.DataFrame({"limit": limit}) for name in ("limits_extended", "limits_delay_free_summary")}
+    settling = {f"settling_{name}_s": 1.5 for name in ("upper", *runs)}
+    return made_up | {
+        "limits_extended": pd.DataFrame({"limit": limit} | settling),
+        "limits_delay_free_summary": pd.DataFrame({"limit": limit}),
+    }
 
 
 def made_up() -> dict[str, pd.DataFrame]:
@@ -217,10 +221,15 @@ def test_drawing(name: str, strict_snapshot: Strict, file_regression: FileRegres
         raise failures[0]
 
 
+def tables_stored(name: str) -> dict[str, pd.DataFrame]:
+    """The stored tables of a figure, and made-up ones in place of those that have no snapshot."""
+    others = made_up()
+    return {table: others[table] if table in others else stored_table(table) for table in figure_module(name).TABLES}
+
+
 def draw_stored(name: str) -> Figure:
-    """Return a figure of the stored tables, and of made-up ones in place of those that have no snapshot."""
-    others, module = made_up(), figure_module(name)
-    return module.draw({table: others[table] if table in others else stored_table(table) for table in module.TABLES})
+    """Return a figure of the stored tables."""
+    return figure_module(name).draw(tables_stored(name))
 
 
 @pytest.mark.parametrize("name", figure_names())

@@ -75,12 +75,12 @@ def test_levels_that_an_order_keeps_without_touching_the_envelope() -> None:
     assert least_largest_excess(BAND, level / 2, level, 2).proved <= 0.5
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(24))
 def test_no_bound_that_exists_is_excluded(seed: int) -> None:
     """A random W_a that covers random residuals: what is proved is not above its own largest excess."""
     rng = np.random.default_rng(seed)
     order = 1 + seed % 8
-    omega = np.sort(10.0 ** (rng.uniform(0, rng.uniform(0.5, 4), rng.integers(5, 150)) + rng.integers(-3, 4)))
+    omega = np.sort(10.0 ** (rng.uniform(0, rng.uniform(0.5, 4), rng.integers(5, 80)) + rng.integers(-3, 4)))
     shape = Shape(order, float(omega[0]), float(omega[-1]))
     magnitude = np.exp(shape.log(np.append(rng.normal(), rng.uniform(*shape.bounds[1:].T)), omega))
     residual = magnitude * rng.uniform(rng.uniform(0, 1), 1, omega.size)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,9 +15,10 @@ from click.testing import CliRunner
 import identification
 from identification.__main__ import main
 from identification.base.errors import InputError
-from identification.fit_model import ModelFit, fit_model
+from identification.fit_model import fit_model
 from identification.fitting.dead_time import same_turn, spacing_of
 from identification.fitting.fit_plant import fit_plant
+from identification.fitting.other_classes import FEWEST
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 from identification.model.structure import Structure, Wanted
@@ -31,6 +31,7 @@ from identification.sweeps.response import FrequencyResponse
 PAIR = PlantModel(0.5, (Mode(120.0, 0.02),), (Mode(200.0, 0.03),), 8e-3)
 OMEGA = 2 * np.pi * np.arange(0.2, 80.1, 0.2)
 FEWER = OMEGA[3::4]
+A_PAIR = Wanted(1, (1, 1), (0, 0))
 
 
 def measured(
@@ -61,7 +62,7 @@ def said(tests: Sequence[FrequencyResponse]) -> str:
 def test_equal_lines_tell_a_dead_time_up_to_a_turn(delay_s: float) -> None:
     omega = 1.25 * np.arange(1, 401)
     test = measured(replace(PAIR, delay_s=delay_s), omega)
-    result = fit_plant([test])
+    result = fit_plant([test], A_PAIR)
     assert result.plant.delay_s == pytest.approx(delay_s, abs=1e-4)
     assert "plus any multiple of 5.027 s" in "\n".join(cautions(result, [test]))
 
@@ -70,7 +71,7 @@ def test_equal_lines_tell_a_dead_time_up_to_a_turn(delay_s: float) -> None:
 def test_lines_beside_the_multiples_of_their_spacing_tell_turns_apart(delay_s: float) -> None:
     omega = 1.0 + 1.25 * np.arange(400)
     test = measured(replace(PAIR, delay_s=delay_s), omega)
-    result = fit_plant([test])
+    result = fit_plant([test], A_PAIR)
     assert result.plant.delay_s == pytest.approx(delay_s, abs=1e-4)
     assert "any multiple" not in "\n".join(cautions(result, [test]))
 
@@ -78,7 +79,7 @@ def test_lines_beside_the_multiples_of_their_spacing_tell_turns_apart(delay_s: f
 def test_a_dead_time_of_a_whole_turn_is_none() -> None:
     """Lines k d do not see it, and the shortest of the dead times that look alike is taken."""
     omega = 1.25 * np.arange(1, 401)
-    result = fit_plant([measured(replace(PAIR, delay_s=2 * np.pi / 1.25 + 0.004), omega)])
+    result = fit_plant([measured(replace(PAIR, delay_s=2 * np.pi / 1.25 + 0.004), omega)], A_PAIR)
     assert result.plant.delay_s == pytest.approx(0.004, abs=1e-4)
 
 
@@ -94,7 +95,7 @@ def test_the_spacing_of_lines() -> None:
 def test_without_a_dead_time_the_plant_printed_is_the_plant_fitted(seed: int) -> None:
     """A dead time that cannot be told from none is 0 in the fit itself, and the misfit is that of this plant."""
     plant = PlantModel(1.0, (), (), 0.0, 0, (), (170.0, 1200.0))
-    test = measured(plant, np.geomspace(6.0, 6000.0, 300), relative=0.03, seed=seed)
+    test = measured(plant, np.geomspace(6.0, 6000.0, 150), relative=0.03, seed=seed)
     result = fit_plant([test])
     assert result.plant.delay_s == 0
     apart = np.abs(test.response - result.plant(1j * test.omega)) / np.abs(test.response)
@@ -128,7 +129,7 @@ def test_three_real_roots_of_each_kind_are_asked_for_and_found() -> None:
 @pytest.mark.parametrize("count", [-2, -1, 0, 1, 2])
 def test_poles_and_zeros_at_the_origin_are_counted(count: int) -> None:
     plant = PlantModel(1e-3, (), (Mode(200.0, 0.03),), 1e-3, count)
-    found = fit_plant([measured(plant)]).plant
+    found = fit_plant([measured(plant, FEWER)]).plant
     assert found.integrators == count
     assert found.pole_modes[0].omega == pytest.approx(200.0, rel=1e-3)
     assert not found.zero_modes
@@ -138,7 +139,7 @@ def test_poles_and_zeros_at_the_origin_are_counted(count: int) -> None:
 def test_a_slow_pole_outside_the_band_is_named() -> None:
     """At 2 % noise a pole at a sixth of the lowest line shows; it is named, and so is what it is like."""
     plant = PlantModel(3.0, (), (Mode(200.0, 0.03),), 1e-3, 0, (), (2.0,))
-    text = said([measured(plant, np.linspace(12.0, 400.0, 400), relative=0.005)])
+    text = said([measured(plant, np.linspace(12.0, 400.0, 200), relative=0.0035)])
     assert re.search(r"real pole is (1\.|2\.)\d* rad/s, below all lines \(12 to 400 rad/s\): .* one at s = 0", text)
 
 
@@ -184,42 +185,42 @@ def test_a_zero_in_the_right_half_plane_can_stand_in_for_a_dead_time(zeros: tupl
 def test_a_reversed_phase_is_named_and_undone() -> None:
     tests = [measured(PAIR, FEWER, seed=k, name=f"day {k}") for k in range(2)]
     reversed_tests = [replace(test, response=test.response.conj()) for test in tests]
-    fitted = fit_model(reversed_tests)
-    assert fitted.model.plant == fit_model(tests).model.plant
+    fitted = fit_model(reversed_tests, A_PAIR)
+    assert fitted.model.plant == fit_model(tests, A_PAIR).model.plant
     assert fitted.record.conjugated
     assert re.search(r"the conjugate fits at 1\.\d %, the response as it is", fitted.record.cautions[0])
     np.testing.assert_array_equal(fitted.tests[0].response, tests[0].response)
 
 
 def test_a_phase_as_it_should_be_is_left() -> None:
-    assert not fit_model([measured(PAIR)]).record.conjugated
+    assert not fit_model([measured(PAIR, FEWER)]).record.conjugated
 
 
-@pytest.mark.parametrize("rate", [30.0, 90.0])
-def test_an_unstable_plant_is_refused_by_name(rate: float) -> None:
-    """K/(1 - s/a): a stable plant's phase falls where this one's rises."""
-    omega = np.geomspace(5.0, 500.0, 60)
+@pytest.mark.parametrize(("rate", "lines", "wanted"), [(30.0, FEWEST, None), (90.0, 60, Wanted(0, (0, 1), (0, 1)))])
+def test_an_unstable_plant_is_refused_by_name(rate: float, lines: int, wanted: Wanted | None) -> None:
+    """K/(1 - s/a): a stable plant's phase falls where this one's rises, whatever structure it is given."""
+    omega = np.geomspace(5.0, 500.0, lines)
     stable = measured(PlantModel(2.0, (), (Mode(200.0, 0.05),), 4e-3, 0), omega)
     test = replace(stable, response=stable.response / (1 - 1j * omega / rate))
     with pytest.raises(
         InputError, match=r"a plant with poles at [238]\d\.\d* rad/s, in the right half plane, fits at 1\.\d %"
     ):
-        fit_model([test])
+        fit_model([test], wanted)
 
 
 @pytest.mark.parametrize("times", [10.0, -1.0])
 def test_an_outlier_is_named_and_hardly_counts(times: float) -> None:
-    omega = np.linspace(12.0, 1200.0, 150)
+    omega = np.linspace(12.0, 1200.0, 100)
     plant = PlantModel(40.0, (Mode(195.0, 0.03),), (Mode(340.0, 0.025),), 1.2e-3)
     test = measured(plant, omega)
     response = test.response.copy()
-    response[60] *= times
+    response[40] *= times
     fitted = fit_model([replace(test, response=response)])
     assert fitted.model.plant.integrators == 1
     assert fitted.model.plant.gain == pytest.approx(40.0, rel=0.02)
     assert not fitted.record.conjugated
     if fitted.record.loss == "soft-L1":
-        hertz = f"{omega[60] / (2 * np.pi):.4g}"
+        hertz = f"{omega[40] / (2 * np.pi):.4g}"
         assert any(f"the plant misses the line at {hertz} Hz by" in caution for caution in fitted.record.cautions)
 
 
@@ -290,7 +291,7 @@ def test_the_scatter_of_tests_tells_noise() -> None:
 def test_a_band_is_asked_for(tmp_path: Path) -> None:
     test = within(measured(PAIR), 1.0, 50.0)
     assert (test.omega[0], test.omega[-1]) == (pytest.approx(2 * np.pi), pytest.approx(100 * np.pi))
-    model = identification.fit([measured(PAIR)], band=(1.0, 50.0))
+    model = identification.fit([measured(PAIR)], modes=1, real=0, band=(1.0, 50.0))
     assert model.fit is not None
     assert model.fit.tests[0].band == (test.omega[0], test.omega[-1])
     with pytest.raises(InputError, match=r"has lines from 0.2 to 80 Hz; expected some .* 90 to 100 Hz"):
@@ -313,20 +314,11 @@ def test_a_band_that_is_none_is_a_mistake(tmp_path: Path) -> None:
 # units
 
 
-@cache
-def fitted(count: int) -> tuple[list[FrequencyResponse], ModelFit]:
-    """So many tests of a pair of modes, and their fit."""
-    tests = [measured(PAIR, seed=k, name=f"day {k}") for k in range(count)]
-    return tests, fit_model(tests)
-
-
-@pytest.mark.parametrize("count", [1, 3])
-@pytest.mark.parametrize(
-    ("of_response", "of_time"), [(1e-30, 1.0), (1e30, 1.0), (-1e3, 1.0), (1.0, 1e-15), (1.0, 1e15), (-1e-20, 1e10)]
-)
+@pytest.mark.parametrize(("count", "of_response", "of_time"), [(1, 1e-30, 1e15), (3, -1e30, 1e-15)])
 def test_units_and_sign_do_not_matter(count: int, of_response: float, of_time: float) -> None:
     """The plant to 1e-6, W_a to its own 1e-3, and as many sentences, over sixty and thirty decades."""
-    tests, usual = fitted(count)
+    tests = [measured(PAIR, FEWER, seed=k, name=f"day {k}") for k in range(count)]
+    usual = fit_model(tests)
     other = fit_model([replace(t, omega=t.omega / of_time, response=t.response * of_response) for t in tests])
     s = 1j * np.geomspace(3.0, 400.0, 50)
     np.testing.assert_allclose(other.model.plant(s / of_time), usual.model.plant(s) * of_response, rtol=1e-6)
@@ -339,15 +331,15 @@ def test_units_and_sign_do_not_matter(count: int, of_response: float, of_time: f
 
 
 def test_intervals_over_few_lines_hold_what_they_say() -> None:
-    """Eight lines, three tests, 120 sets: 95 % intervals that are too narrow by 15 % would fail once in 300 times."""
+    """Eight lines, three tests, 60 sets, of which 57 are expected to be held: intervals too narrow by 10 % hold 51."""
     omega, truth = np.geomspace(1.0, 1000.0, 8), np.array([0.7, 0.1])
     plant, wanted = PlantModel(0.7, (), (), 0.1, 1), Wanted(1, (0, 0), (0, 0))
     hits = np.zeros(2)
-    for k in range(120):
+    for k in range(60):
         tests = [measured(plant, omega, seed=[k, i], name=str(i)) for i in range(3)]
         lower, upper = fit_plant(tests, wanted).nominal.intervals
         hits += (lower <= truth) & (truth <= upper)
-    assert np.all(hits >= 108)
+    assert np.all(hits >= 54)
 
 
 def test_a_structure_says_what_it_has() -> None:
@@ -360,7 +352,8 @@ def test_a_structure_says_what_it_has() -> None:
 
 def test_a_plant_is_compared_with_the_tests_as_its_fit_used_them(tmp_path: Path) -> None:
     """Sweeps that are read again are turned and cut as the fit did; those that it kept are so already."""
-    test = replace(measured(PAIR), response=measured(PAIR).response.conj(), name="reversed")
+    right = measured(PAIR, FEWER)
+    test = replace(right, response=right.response.conj(), name="reversed")
     fitted = fit_model([test], band=(1.0, 50.0))
     write_responses(tmp_path / "kept.npz", fitted.tests)
     kept = read_responses(tmp_path / "kept.npz")
@@ -369,13 +362,13 @@ def test_a_plant_is_compared_with_the_tests_as_its_fit_used_them(tmp_path: Path)
         np.testing.assert_array_equal(used.response, fitted.tests[0].response)
         assert sum(lines.omega.size for lines in used.left_out) == test.omega.size - used.omega.size
         assert used.conjugated
-    again = fit_model(kept)
+    again = fit_model(kept, A_PAIR)
     assert again.record.conjugated
     assert again.record.cautions[0].startswith("the sign of the phase is reversed")
 
 
 def test_a_test_of_another_name_is_left_with_all_its_lines() -> None:
-    model = fit_model([measured(PAIR, name="day 1")], band=(1.0, 50.0)).model
+    model = fit_model([measured(PAIR, name="day 1")], A_PAIR, band=(1.0, 50.0)).model
     (used,) = as_fitted(model, [measured(PAIR, name="day 2")])
     assert used.omega.size == OMEGA.size
 
@@ -396,9 +389,9 @@ def test_tests_of_different_plants_are_not_cut_as_noise() -> None:
 def test_a_reversal_is_kept_for_each_test() -> None:
     """A test that a fit turned and one that it did not, fitted together: each is compared as it was used."""
     right = measured(PAIR, FEWER, seed=1, name="right")
-    turned = fit_model([replace(right, response=right.response.conj(), name="turned")]).tests[0]
+    turned = fit_model([replace(right, response=right.response.conj(), name="turned")], A_PAIR).tests[0]
     tests = [turned, right]
-    compared = as_fitted(fit_model(tests).model, tests)
+    compared = as_fitted(fit_model(tests, A_PAIR).model, tests)
     for test, used in zip(tests, compared, strict=True):
         np.testing.assert_array_equal(used.response, test.response)
 
@@ -406,7 +399,7 @@ def test_a_reversal_is_kept_for_each_test() -> None:
 def test_sweeps_of_a_joined_fit_are_joined_again() -> None:
     bands = [np.geomspace(3.0, 160.0, 60), np.geomspace(100.0, 500.0, 60)]
     tests = [measured(PAIR, omega, seed=k, name=str(k)) for k, omega in enumerate(bands)]
-    fitted = fit_model(tests)
+    fitted = fit_model(tests, A_PAIR)
     (used,) = as_fitted(fitted.model, tests)
     assert used.name == fitted.tests[0].name == "0 and 1"
     np.testing.assert_array_equal(used.response, fitted.tests[0].response)
@@ -422,7 +415,7 @@ def test_lines_left_out_are_named_side_by_side() -> None:
 
 def test_a_plain_reversal_is_found_beside_a_simple_unstable_plant() -> None:
     plant = PlantModel(7.0, (Mode(180.0, 0.03), Mode(600.0, 0.05)), (Mode(280.0, 0.02), Mode(750.0, 0.05)), 8e-3)
-    test = measured(plant, 2 * np.pi * np.geomspace(0.3, 160.0, 160))
-    fitted = fit_model([replace(test, response=test.response.conj())])
+    test = measured(plant, 2 * np.pi * np.geomspace(0.3, 160.0, 100))
+    fitted = fit_model([replace(test, response=test.response.conj())], Wanted(1, (2, 2), (0, 0)))
     assert fitted.record.conjugated
     assert fitted.model.plant.gain == pytest.approx(7.0, rel=0.01)

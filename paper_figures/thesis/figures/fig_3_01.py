@@ -13,12 +13,11 @@ from paper_figures.thesis.figures.block_diagrams import Diagram
 TABLES: tuple[str, ...] = ()
 
 CAPTION = (
-    "Smith predictor-based controller structure (thesis Fig. 3.1): the controller C_1(s) of Fig. 3.2 acts "
-    "on the error e in a loop with the plant P(s) of Eq. (3.1), which has an integrator and dead time; the "
-    "disturbance d is negligible. The text names C_1, P and H but not their places: d at the plant input "
-    "and H(s) in the feedback path are our deduction, and the label u of the output of C_1(s) is our own. "
-    "The remark that H(s) does not contribute to the stability would fit a filter of the reference r as "
-    "well; with H(s) = 1, which the text takes, the two loops are the same."
+    "Smith predictor-based controller structure (thesis Fig. 3.1): the controller C_1(s) of Fig. 3.2 acts on the error "
+    "e in a loop with the plant P(s) of Eq. (3.1), which has an integrator and dead time. The disturbance d is "
+    "negligible. The text names C_1, P and H but not their places: we deduce that d acts at the plant's input and that "
+    "H(s) is in the feedback path. The label u is ours. With H(s) = 1, which the text takes, H(s) could filter the "
+    "reference just as well."
 )
 
 

@@ -51,6 +51,6 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     for run, (kind, look, label) in RUNS.items():
         at = of_run(summary, run, "recovery_s"), of_run(summary, run, "f")
         panel.plot(*at, **look, linestyle="none", markersize=5.0, color=LINES[kind]["color"], label=label)
-    panel.set(xlabel="Recovery time [s]", ylabel="$f$ [m per unit of $u$]")
+    panel.set(xlabel="Recovery time [s]", ylabel="$f$ [unit of $W_a$]")
     panel.legend(**panels.ABOVE, ncols=2)
     return figure

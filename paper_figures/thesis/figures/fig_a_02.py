@@ -45,7 +45,7 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
         axes["a"].loglog(part["omega"], part["sensitivity"], **(line | {"linewidth": 0.5, "alpha": 0.7}))
         works = part["sensitivity"].where(part["works"] == 1)
         axes["a"].loglog(part["omega"], works, **(line | {"linewidth": line["linewidth"] + 0.8}), label=label)
-    axes["a"].set(xlabel=r"$\omega$ [rad/s]", ylabel=r"$\|S\|_\infty$ [-]", ylim=(0.9, 30))
+    axes["a"].set(xlabel=r"$\omega$ [rad/s]", ylabel=r"$\|S\|_\infty$ [-]", ylim=(0.9, 20))
     axes["a"].set_xlim(table["omega"].min(), table["omega"].max())
     axes["a"].legend(**panels.ABOVE, ncols=3)
     grid = tables["interpolation_map"].pivot(index="a_delay", columns="omega_delay", values="margin")

@@ -73,7 +73,7 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     axes["a"].plot([], [], **FLOOR, label="best that was found")
     for run in RUNS:
         axes["a"].plot([], [], **LINES[run.kind], label=run.label)
-    axes["a"].set(xlabel="Time $t_0$ [s]", ylabel=r"$\max_{t \geq t_0}\,|e(t)|$ [m]")
+    axes["a"].set(xlabel="Time $t_0$ [s]", ylabel=r"$\max_{t \geq t_0}\,|e(t)|$ [unit of $y$]")
     axes["a"].legend(**panels.ABOVE, ncols=2)
 
     dots = {f"peak_{run.name}": _dots(run) for run in RUNS}
@@ -86,7 +86,7 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     first, last = float(periodic["limit"].min()), float(periodic["limit"].max())
     right = max(min(last, ROOM * required), ROOM * first)
     axes["b"].set_xlim(first - MARGIN * (right - first), right)
-    axes["b"].set(xlabel="Limit $L$ [unit of $u$]", ylabel=r"$\max\,|e(t)|$, last period [m]")
+    axes["b"].set(xlabel="Limit $L$ [unit of $u$]", ylabel=r"$\max\,|e(t)|$, last period [unit of $y$]")
     axes["b"].legend(**panels.ABOVE, ncols=2)
     figure = axes["a"].get_figure(root=True)
     assert figure is not None

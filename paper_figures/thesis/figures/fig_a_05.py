@@ -42,9 +42,9 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
         f"{round(2 * only(summary, 'limit') / quantum)} steps, {duration(only(summary, 'full_range_s'))} across, one "
         f"sample late. (a) The largest error from t0 on: broad, continuous time; thin, the drive at "
         f"{shown}, Tustin's rule. Corrected, it {ends[0]} and {ends[1]}. (b) The largest error of "
-        f"the last period; dotted, the rate of (a). Corrected, at {slowest} to {fastest}: {held} m with held inputs, "
-        f"{tustin} m with Tustin's rule. The thesis's offset, "
-        f"{_size(_of(summary, 'thesis', CONTINUOUS, math.nan, 'steady_error'))} m, stays.{_divergent(summary)}"
+        f"the last period; dotted, the rate of (a). Corrected, at {slowest} to {fastest}: {held} with held inputs, "
+        f"{tustin} with Tustin's rule. The thesis's offset, "
+        f"{_size(_of(summary, 'thesis', CONTINUOUS, math.nan, 'steady_error'))}, stays.{_divergent(summary)}"
     )
 
 
@@ -79,12 +79,12 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
         drive = panels.envelope(time_s, tails[f"error_{run.name}_drive"])
         axes["a"].plot(*drive, **(line | {"linewidth": 1.0}), label=run.label, zorder=3 + order)
     axes["a"].plot([], [], color=BROAD, linewidth=4.0, label="continuous time")
-    axes["a"].set(xlabel="Time $t_0$ [s]", ylabel=r"$\max_{t \geq t_0}\,|e(t)|$ [m]")
+    axes["a"].set(xlabel="Time $t_0$ [s]", ylabel=r"$\max_{t \geq t_0}\,|e(t)|$ [unit of $y$]")
     axes["a"].set_xlim(0, time_s[-1] - only(summary, "period_s"))
     axes["a"].legend(**panels.ABOVE, ncols=2)
     over_rate(axes["b"], summary, [run.name for run in RUNS])
-    axes["b"].axvline(only(summary, "shown_hz"), **LINES["family 6"])
-    axes["b"].set_ylabel(r"$\max\,|e(t)|$, last period [m]")
+    axes["b"].axvline(only(summary, "shown_hz"), **LINES["family 6"], label="rate of (a)")
+    axes["b"].set_ylabel(r"$\max\,|e(t)|$, last period [unit of $y$]")
     axes["b"].legend(**panels.ABOVE, ncols=2)
     peaks = np.array([tail[0] for tail in tails.values() if np.isfinite(tail[0])])
     top = 2 * min(peaks.max(), DIVERGENT * peaks.min()) if len(peaks) else 1.0

@@ -50,4 +50,4 @@ def _percent(share: float) -> str:
 @styled()
 def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the figure; an axis of errors is logarithmic where they differ a hundredfold."""
-    return distributions(tables, {run.name: run.label for run in RUNS}, "m")
+    return distributions(tables, {run.name: run.label for run in RUNS}, "unit of y")

@@ -107,8 +107,9 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     for letter, kind, words in (("a", NONE, "none"), ("c", THESIS, "thesis")):
         _key(axes[letter], _look(kind, 0, "implied") | {"label": f"{words}, from rest"})
         _key(axes[letter], _look(kind, 1, "implied") | {"label": "from $y(0) = r(0)$"})
+    _key(axes["b"], _look(NONE, 0, "table") | {"label": NAMES["table"]})
     _key(axes["b"], LINES["family 4"] | {"label": "printed"}, DOTS | {"markersize": 4.0, "label": "Pade"})
-    _key(axes["d"], _look(THESIS, 0, "table") | {"label": "Table 2.1"})
+    _key(axes["d"], _look(THESIS, 0, "table") | {"label": NAMES["table"]})
     _key(axes["d"], LINES["reference"] | {"label": "needed to track"})
     axes["b"].set_ylim(top=12)
     axes["c"].set_ylim(top=8)
@@ -122,7 +123,9 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
 def _look(kind: str, start: int, name: str) -> dict[str, Any]:
     """The line of an anti-windup from rest (0) or from y(0) = r(0) (1) with a parameter set."""
     line = LINES[kind] | {"linewidth": (1.8, 0.8)[start]}
-    return line if name == "implied" else line | {"color": panels.paler(line["color"], 0.5)}
+    if name != "implied":
+        line = panels.band(line)
+    return line | {"zorder": 3 - line["linewidth"] / 10}
 
 
 def _key(panel: Axes, *looks: Mapping[str, Any]) -> None:
@@ -197,4 +200,4 @@ def _errors(panel: Axes, rows: pd.DataFrame, summary: pd.DataFrame) -> None:
     panel.axvline(float(least["limit"].iloc[0]), **LINES["saturation limits"], label="printed $L$")
     panels.key(panel)
     panel.set(xlabel=LIMIT, ylabel="$|e|$, last period [%]", yscale="log", ylim=(1e-2, 200))
-    panel.set_xlim(0.9 * float(least["limit"].iloc[0]), 1.2 * float(least["limit"].iloc[0]))
+    panel.set_xlim(0.88 * float(least["limit"].iloc[0]), 1.2 * float(least["limit"].iloc[0]))

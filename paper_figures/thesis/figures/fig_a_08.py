@@ -27,15 +27,13 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     least, from_s = (float(start[column].max()) for column in ("least_peak_error", "from_s"))
     physical = ""
     if not math.isnan(least):
-        forced = (
-            f"every controller leaves an error |r - y| of {at_least(least)} m" if least > 0 else "no error is forced"
-        )
-        physical = f" From {number(from_s)} s after the start on {forced}."
+        forced = f"every controller leaves an error |r - y| of {at_least(least)}" if least > 0 else "no error is forced"
+        physical = f" From {number(from_s)} s on {forced}."
     return (
-        f"Other anti-windups in the loop of chapter 4, limits {of_limits(table)}. The distance of the output from that "
-        "of the loop without limits, (a) from rest, (b) after a disturbance of half the range at the plant's input for "
-        "a tenth of a period; dotted, 1 %, which counts as recovered. (c), (d) Full marker: recovery is guaranteed for "
-        f"any control; half, within a sector; open, not guaranteed.{_absent(table)}{physical}"
+        f"Other anti-windups in the loop of chapter 4, limits {of_limits(table)}: the distance of the output from that "
+        "without limits, (a) from rest, (b) after a pulse of half the range at the plant's input for a tenth of a "
+        "period. Below 1 % (dotted) it has recovered. (c), (d) Full marker: recovery guaranteed for any control; "
+        f"half, within a sector; open, not at all.{_absent(table)}{physical}"
     )
 
 

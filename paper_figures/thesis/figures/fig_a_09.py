@@ -39,7 +39,7 @@ def _said(summary: pd.DataFrame, form: str) -> str:
     drift, largest = (of_run(summary, form, column) for column in ("drift", "largest_drift"))
     if math.isnan(drift):
         return "The loop diverges"
-    return f"The drift ends at {number(drift)} m (at most {number(largest)})"
+    return f"The drift ends at {number(drift)} (at most {number(largest)})"
 
 
 def _expected(summary: pd.DataFrame) -> str:
@@ -48,7 +48,7 @@ def _expected(summary: pd.DataFrame) -> str:
     if math.isnan(expected):
         return ""
     growth = GROWTH[int(only(summary, "integrators"))]
-    return f"; half a step makes -K (step/2){growth} = {number(expected)} m (dashed)"
+    return f"; half a step makes -K (step/2){growth} = {number(expected)} (dashed)"
 
 
 @styled()
@@ -59,15 +59,18 @@ def draw(tables: Mapping[str, pd.DataFrame]) -> Figure:
     time_s = table["time_s"]
     for form, (kind, label) in FORMS.items():
         drift = table[f"drift_{form}"]
-        axes["a"].plot(time_s, drift, **LINES[kind], label=label)
-        axes["b"].loglog(time_s, drift.abs(), **LINES[kind])
+        on_top = 3 - LINES[kind]["linewidth"] / 10
+        axes["a"].plot(time_s, drift, **LINES[kind], label=label, zorder=on_top)
+        axes["b"].loglog(time_s, drift.abs(), **LINES[kind], zorder=on_top)
     expected = only(summary, "expected_drift")
     if not math.isnan(expected):
         line = expected * (time_s / only(summary, "duration_s")) ** only(summary, "integrators")
-        axes["a"].plot(time_s, line, **LINES["reference"])
-        axes["b"].loglog(time_s, line.abs(), **LINES["reference"], label="half a step")
+        axes["a"].plot(time_s, line, **LINES["reference"], zorder=3)
+        axes["b"].loglog(time_s, line.abs(), **LINES["reference"], label="half a step", zorder=3)
         axes["b"].legend(**panels.ABOVE)
-    axes["a"].set(xlabel="Time $t$ [s]", ylabel="Drift of the output $y$ [m]", xlim=(0, time_s.iloc[-1]))
-    axes["b"].set(xlabel="Time $t$ [s]", ylabel="Size of the drift [m]", xlim=(time_s.iloc[0], time_s.iloc[-1]))
+    axes["a"].set(xlabel="Time $t$ [s]", ylabel="Drift of the output $y$ [unit of $y$]", xlim=(0, time_s.iloc[-1]))
+    axes["b"].set(
+        xlabel="Time $t$ [s]", ylabel="Size of the drift [unit of $y$]", xlim=(time_s.iloc[0], time_s.iloc[-1])
+    )
     axes["a"].legend(**panels.ABOVE, ncols=2)
     return axes["a"].figure  # type: ignore[return-value]

@@ -75,14 +75,15 @@ def thinned(values: Real, size: int) -> Real:
     ndarray
         Shape (2 ceil(rows/size), columns); NaN where a column has no value in any of the rows.
     """
-    count = ceil(len(values) / size)
-    blocks = np.full((count * size, values.shape[1]), np.nan)
-    blocks[: len(values)] = values
-    blocks = blocks.reshape(count, size, -1)
+    count, columns = ceil(len(values) / size), values.shape[1]
+    padded = np.full((count * size, columns), np.nan)
+    padded[: len(values)] = values
+    blocks = padded.reshape(count, size, columns)
     least, greatest = np.fmin.reduce(blocks, axis=1), np.fmax.reduce(blocks, axis=1)
     first = (blocks == least[:, None]).argmax(axis=1) <= (blocks == greatest[:, None]).argmax(axis=1)
-    ends = np.where(first, least, greatest), np.where(first, greatest, least)
-    return np.stack(ends, axis=1).reshape(2 * count, -1)
+    kept = np.empty((count, 2, columns))
+    kept[:, 0], kept[:, 1] = np.where(first, least, greatest), np.where(first, greatest, least)
+    return kept.reshape(2 * count, columns)
 
 
 def _embedded(name: str, text: str) -> Embedded:
