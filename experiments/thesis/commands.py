@@ -154,7 +154,7 @@ def conditions(scheduler: str | None, output: Path) -> None:
 @thesis.command("wide-conditions")
 @OUTPUT_FOLDER
 def wide_conditions(output: Path) -> None:
-    """More of what the thesis does not print, in some ten minutes: wide_conditions.csv."""
+    """Search more conditions than the command conditions does, for some minutes: wide_conditions.csv."""
     from functools import partial
 
     from tqdm import tqdm

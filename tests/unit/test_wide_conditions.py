@@ -67,6 +67,18 @@ def test_the_lower_limit_is_its_own() -> None:
     assert equal == NAMED["equal limits"].outcomes("none", values)
 
 
+def test_under_a_wide_lower_limit_its_windup_is_brief() -> None:
+    """At the nearest converging point of the page."""
+    case, values = NAMED["unequal limits"], {"upper": 10.564, "initial_output": 60.2396}
+    time_s = np.linspace(0.0, 2.0, 3)
+    wide, equal = (
+        simulate(case.started("thesis", values), (-lower, values["upper"]), time_s) for lower in (21.8668, 10.564)
+    )
+    (first,) = np.flatnonzero(wide.modes == -1)
+    assert wide.events_s[first + 1] - wide.events_s[first] == pytest.approx(0.002, abs=5e-4)
+    assert equal.events_s[-1] == pytest.approx(1.4, abs=0.05)
+
+
 def test_the_printed_blocks_are_those_of_the_text() -> None:
     s = np.array([0.3, 40.0, 200j + 1, 900j])
     zeros = (1 + 0.016 * s / 175 + (s / 175) ** 2) * (1 + 0.08 * s / 930 + (s / 930) ** 2)
@@ -105,23 +117,25 @@ def test_limits_crowd_towards_what_they_exceed() -> None:
 
 
 def nearest_points() -> list[tuple[str, ...]]:
-    """The cells of the page's table of nearest points."""
+    """The rows of the page's tables of nearest points: condition, error, miss, last error, where."""
     _, _, after = PAGE.read_text(encoding="utf-8").partition("### The nearest points")
-    rows = [line for line in after.partition("\n## ")[0].splitlines() if line.startswith("|")][2:]
-    cells = [tuple(cell.strip() for cell in row.strip("|").split("|")) for row in rows]
-    return [row for row in cells if "none" not in row[2]]
+    lines = [line for line in after.partition("\n## ")[0].splitlines() if line.startswith("| `")]
+    rows = [[cell.strip(" `") for cell in line.split("|")[1:-1]] for line in lines]
+    where = {(name, error): points for name, error, *rest in rows if len(rest) == 1 for points in rest}
+    found = [(name, error, *rest[-2:]) for name, error, *rest in rows if len(rest) > 1]
+    return [(*row, where[row[0], row[1]]) for row in found if row[2] != "diverges"]
 
 
 @pytest.mark.parametrize("row", nearest_points(), ids=lambda row: f"{row[0]}, {row[1]}")
 def test_the_nearest_points_of_the_page_miss_by_what_it_says(row: tuple[str, ...]) -> None:
-    """Run again, and with other samples."""
-    name, error, point, *_, miss, final = row
-    case = NAMED[name.strip("`")]
-    values = {key: float(value) for key, value in re.findall(r"`(\w+)` (-?[\d.]+)", point)}
+    """Run again with other samples."""
+    name, error, miss, final, where = row
+    case = NAMED[name]
+    values = {key: float(value) for key, value in re.findall(r"(\w+)` (-?[\d.]+)", where)}
     assert set(values) == {axis.name for axis in case.axes}
     assert all(axis.low <= values[axis.name] <= axis.high for axis in case.axes)
     again = Tried(case, np.zeros(0), values, case.outcomes("none", values, 700) | case.outcomes("thesis", values, 700))
-    assert 100 * again.miss(converging=False) == pytest.approx(float(miss.split()[0]), abs=0.3)
+    assert 100 * again.miss(converging=False) == pytest.approx(float(miss.split()[0]), abs=0.5)
     assert again.outcomes["final_error_percent"] == pytest.approx(float(final.split()[0]), rel=0.05, abs=0.01)
     assert again.outcomes["final_error_percent"] < CONVERGED_PERCENT or error == "any"
 

@@ -16,9 +16,9 @@ from experiments.thesis.unprinted.joint_search import least_miss, nearest_readin
 from experiments.thesis.unprinted.printed_outcomes import CONVERGED_PERCENT, READINGS, printed_outcomes
 from experiments.thesis.unprinted.wide_conditions import CASES, Case
 
-COVERING = 10  # log2 of the number of points that cover each case
-STARTS = 8  # of these points, from which the search goes on
-EVALUATIONS = 100  # of one such search, for each condition that is searched
+COVERING = 9  # log2 of the number of points that cover each case
+STARTS = 5  # of these points, from which the search goes on
+EVALUATIONS = 60  # of one such search, for each condition that is searched
 FIRST_STEP = 0.05  # of such a search, as a share of each range
 
 _MOST = 1e6  # stands for an infinite miss: the search takes differences
