@@ -136,11 +136,13 @@ class Windup:
             return (
                 "the windup ends once the linear loop's control stays within the limits, which it does not by the end"
             )
-        known = "" if self.stored is None else f", to {self.stored:.3g} by the state then"
+        known = (
+            "" if self.stored is None else f" (known before the run) and at most {self.stored:.3g} (by the state then)"
+        )
         t0, delta, most = (f"{each:.3g}" for each in (self.bound.from_s, self.bound.distance, self.bound.most))
         return (
-            f"from t = {t0} s on the linear loop's control stays {delta} within the limits, so that |u - sat(u)| "
-            f"integrates to {most} at most{known}; it did to {self.was:.3g}"
+            f"from t = {t0} s on the linear loop's control stays {delta} within the limits, and the integral of "
+            f"|u - sat(u)| is at most {most}{known}; in this run it was {self.was:.3g}"
         )
 
 
