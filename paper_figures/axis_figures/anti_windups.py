@@ -100,19 +100,23 @@ def comparison(tables: Mapping[str, pd.DataFrame], words: Mapping[str, str]) -> 
 
 def _distances(panel: Axes, runs: pd.DataFrame, begin: float, amplitude: float, words: Mapping[str, str]) -> None:
     time_s = runs["time_s"].to_numpy(float) - begin
-    last_s, top = 0.0, 10 * SETTLED
-    for run, said in words.items():
-        if f"output_{run}" in runs:
-            distance = (runs[f"output_{run}"] - runs["output_unsaturated"]).abs().to_numpy(float) / amplitude
-            line = LINES[look_of(run)]
-            points = panels.envelope(time_s, np.maximum(distance, FLOOR / 10))
-            panel.plot(*points, **line, label=said, zorder=3 - line["linewidth"] / 10)
-            top = max(top, 2 * float(distance.max()))
-            last_s = max(last_s, float(time_s[distance > FLOOR].max(initial=0.0)))
+    distances = {
+        run: (runs[f"output_{run}"] - runs["output_unsaturated"]).abs().to_numpy(float) / amplitude
+        for run in words
+        if f"output_{run}" in runs
+    }
+    top = max([10 * SETTLED, *(2 * float(distance.max()) for distance in distances.values())])
+    last_s = max([0.0, *(float(time_s[distance > FLOOR].max(initial=0.0)) for distance in distances.values())])
+    end_s = min(time_s[-1], ROOM * last_s or time_s[-1])
+    shown = time_s <= end_s
+    for run, distance in distances.items():
+        line = LINES[look_of(run)]
+        points = panels.envelope(time_s[shown], np.maximum(distance[shown], FLOOR / 10))
+        panel.plot(*points, **line, label=words[run], zorder=3 - line["linewidth"] / 10)
     if not last_s:
         _say(panel, "no run is away by as much as 0.1 %")
     panel.axhline(SETTLED, **LINES["saturation limits"])
-    panel.set(yscale="log", ylim=(FLOOR, min(top, MOST)), xlim=(0.0, min(time_s[-1], ROOM * last_s or time_s[-1])))
+    panel.set(yscale="log", ylim=(FLOOR, min(top, MOST)), xlim=(0.0, end_s))
     panel.set(xlabel="Time after the upset [s]", ylabel=r"$|y - y_\mathrm{unsaturated}|$ / amplitude [-]")
 
 
