@@ -129,7 +129,7 @@ fit_options = together(
         "--loss",
         default="least-squares",
         type=click.Choice(["least-squares", "soft-l1"]),
-        help="Loss function of the fit; soft-l1 reduces the influence of outliers.",
+        help="Loss function of the fit; soft-l1 reduces the influence of outliers on the parameters.",
     ),
     click.option(
         "--bound-order",

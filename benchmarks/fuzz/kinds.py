@@ -239,7 +239,18 @@ def options(rng: random.Random, cheap: bool) -> Case:
 REFERENCE = b"time_s,reference\n0,0\n1,2.5\n3,-1\n"
 
 LONG = (
-    *("claims", "pid", "conditions", "limits", "campaign", "trade-off", "sampled-rates", "hidden-modes", "report"),
+    *(
+        "claims",
+        "pid",
+        "conditions",
+        "wide-conditions",
+        "limits",
+        "campaign",
+        "trade-off",
+        "sampled-rates",
+        "hidden-modes",
+        "report",
+    ),
     "rates",
     "equations",
 )

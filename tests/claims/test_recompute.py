@@ -135,11 +135,11 @@ def test_ledger_with_other_columns_is_refused(tmp_path: Path):
     [
         ([""], "the columns are none"),
         ([",".join(COLUMNS)], "no rows below"),
-        ([",".join(COLUMNS), "a,b"], "line 2: 2 cells; expected 10"),
+        ([",".join(COLUMNS), "a,b"], "line 2: 2 cells; expected 11"),
         ([",".join(COLUMNS), 'a,"b'], "line 2: unexpected end of data"),
-        ([",".join(COLUMNS), "a,,,1,,,,,,", "a,,,1,,,,,,"], "the id a stands twice"),
+        ([",".join(COLUMNS), "a,,,1,,,,,,,", "a,,,1,,,,,,,"], "the id a stands twice"),
         (
-            [",".join(COLUMNS), "a,,,1,,,os:getcwd,,,"],
+            [",".join(COLUMNS), "a,,,1,,,os:getcwd,,,,"],
             "compute of a is 'os:getcwd'; expected experiments.module:function",
         ),
     ],
