@@ -18,7 +18,6 @@ if TYPE_CHECKING:  # what the fixtures need they import, since pytest-xdist's fi
     from identification.model.model_file import IdentifiedModel
 
 LONGEST = (
-    "hygiene/test_site.py",
     "hygiene/test_site.py",  # builds the documentation
     "claims/test_ledger.py",  # compiles the engine, while another worker fits
     "unit/test_first_contact.py",
