@@ -76,6 +76,17 @@ RATE_LIMIT = click.option(
     help="Largest change of the actuator's output per second, in its unit. The controller does not know it.",
 )
 
+drive_options = together(
+    click.option(
+        "--quantum",
+        type=float,
+        default=0.0,
+        help="Distance between two levels of the actuator, in its unit; 0 for no levels.",
+    ),
+    click.option("--input-delay", type=float, default=0.0, help="Delay from the sample to the actuator, in seconds."),
+)
+"""The levels and the delay of a real actuator: ``--quantum`` and ``--input-delay``."""
+
 SCHEDULER = click.option(
     "--scheduler",
     metavar="ADDRESS",

@@ -10,7 +10,15 @@ from typing import Any
 
 import click
 
-from experiments.options import ANTI_WINDUP, DESIGN, LIMIT_PAIR, asked_limits, disturbance_options, reference_options
+from experiments.options import (
+    ANTI_WINDUP,
+    DESIGN,
+    LIMIT_PAIR,
+    asked_limits,
+    disturbance_options,
+    drive_options,
+    reference_options,
+)
 from experiments.pair_options import PairCommand
 from experiments.tables import csv_writer
 from identification.base.axis_option import AXIS
@@ -170,13 +178,7 @@ def simulate_command(
         "loop, the one with the least steady error."
     ),
 )
-@click.option(
-    "--quantum",
-    type=float,
-    default=0.0,
-    help="Distance between two levels of the actuator, in its unit; 0 for no levels.",
-)
-@click.option("--input-delay", type=float, default=0.0, help="Delay from the sample to the actuator, in seconds.")
+@drive_options
 @click.option(
     "--form",
     default="coprime",

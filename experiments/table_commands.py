@@ -13,6 +13,7 @@ from experiments.options import (
     OUTPUT_FOLDER,
     RATE_LIMIT,
     asked_limits,
+    drive_options,
     reference_options,
 )
 from experiments.pair_options import PairCommand
@@ -45,13 +46,7 @@ def tracking_command(design: Path, limit: tuple[float, ...], rate_limit: float, 
 @reference_options
 @RATE_LIMIT
 @click.option("--rate", type=float, help="Also run at this sampling rate, in Hz.")
-@click.option(
-    "--quantum",
-    type=float,
-    default=0.0,
-    help="Distance between two levels of the actuator, in its unit; 0 for no levels.",
-)
-@click.option("--input-delay", type=float, default=0.0, help="Delay from the sample to the actuator, in seconds.")
+@drive_options
 @OUTPUT_FOLDER
 def rates_command(
     design: Path,
