@@ -56,7 +56,8 @@ class Design:
     added
         Any others by their names.
     compared
-        What each does beside none in one run, a sentence each, the one that does harm first; empty where none was run.
+        What each does beside none in one run, a sentence each, the one that does harm first, then what the loop does
+        without anti-windup and under which conditions; empty where none was run.
     signals
         Names and units of the plant's input and output.
     """

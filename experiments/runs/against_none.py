@@ -80,25 +80,25 @@ class Comparison:
     def __str__(self) -> str:
         """A sentence for each anti-windup: those that are worse than none, then the corrected one, then the others.
 
-        One sentence where no run reaches a limit.
+        Then one for the loop without anti-windup, and one for the conditions. One alone where no run reaches a limit.
         """
         where = f"under the limits {limits_text(*self.limits)}{self.conditions}"
+        none = self.outcomes["none"]
         if all(each.largest_control <= 1 for each in self.outcomes.values()):
-            return (
-                f"no anti-windup acts {where}: |u| reaches {self.outcomes['none'].largest_control:.3g} times the limit"
-            )
+            return f"no anti-windup acts {where}: |u| reaches {none.largest_control:.3g} times the limit"
         names = [name for name in self.outcomes if name != "none"]
         names.sort(key=lambda name: (not self.is_worse(name), name != "corrected"))
-        return "\n".join(self._sentence(name, where) for name in names)
+        without = f"without anti-windup the loop {self._did(none)}"
+        return "\n".join([*map(self._sentence, names), without, f"compared {where}"])
 
-    def _sentence(self, name: str, where: str) -> str:
-        own, none = self.outcomes[name], self.outcomes["none"]
-        did = f"{where}: with {name} the loop {self._did(own)}; without anti-windup it {self._did(none)}"
+    def _sentence(self, name: str) -> str:
+        own = self.outcomes[name]
+        did = f"with {name} the loop {self._did(own)}"
         if self.is_worse(name):
-            return f"{name} is WORSE than no anti-windup {did}"
+            return f"{name} is WORSE than no anti-windup: {did}"
         if math.isinf(own.recovery_s):
-            return f"neither with {name} nor without anti-windup does the loop follow {did}"
-        return f"{name} is no worse than no anti-windup {did}"
+            return f"{name} does not help: {did}"
+        return f"{name} is no worse than no anti-windup: {did}"
 
     def _did(self, outcome: Outcome) -> str:
         """What a run does: recovered is y within BAND of what it is without limits, off how far it is from that."""
