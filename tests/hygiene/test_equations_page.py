@@ -219,6 +219,11 @@ def test_cells_are_escaped(table: pd.DataFrame) -> None:
     assert r"a \| b, c\~ \* d\~, `e.f` |" in page
 
 
+def test_formulas_are_not_escaped(table: pd.DataFrame) -> None:
+    page = equations_page(changed(table, "(2.18)", remark=r"a*, $\lvert [W_1 * S] \rvert < 1$, b*, $c~d$"))
+    assert r"| a\*, $\lvert [W_1 * S] \rvert < 1$, b\*, $c~d$ |" in page
+
+
 def test_command_writes_the_page(tmp_path: Path) -> None:
     page = tmp_path / "equations.md"
     result = CliRunner().invoke(main, ["thesis", "equations", "--page", str(page)])

@@ -118,8 +118,8 @@ def _lines(rows: pd.DataFrame) -> Iterator[str]:
 
 
 def _text(cell: str) -> str:
-    """With what Markdown would take for its own escaped, but for code between ` signs."""
-    return re.sub(r"([|~*<\[])", r"\\\1", cell)
+    r"""With what Markdown would take for its own escaped, but for formulas between $ signs (a bar there is \lvert)."""
+    return re.sub(r"(\$[^$|]*\$)|([|~*<\[])", lambda found: found[1] or "\\" + found[2], cell)
 
 
 def _function_link(name: str) -> str:
