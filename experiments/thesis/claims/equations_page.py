@@ -44,8 +44,7 @@ The page is made from `data/thesis/equations.csv` by
 `python -m experiments thesis equations --page docs/thesis/equations.md`.
 A test fails when a label is missing, has no function that names it or no test; `benchmarks/equations_study.py` runs
 each test by itself and says whether it executed the function. Links are to files: search for the name there. What the
-thesis
-claims beyond its equations is judged in [claims.md](claims.md)."""
+thesis claims beyond its equations is judged in [claims.md](claims.md)."""
 
 
 def read_equations(path: Path = EQUATIONS) -> pd.DataFrame:
