@@ -27,7 +27,7 @@ from experiments.runs.metrics import over_last
 from experiments.runs.references import Reference
 from experiments.thesis.printed_choices import chapter_2, thesis_reference
 from experiments.thesis.studies.chapter_2 import PERIODS
-from experiments.thesis.unprinted.chapter_4_conditions import Prepared, prepared
+from experiments.thesis.unprinted.chapter_4_conditions import Prepared, from_output
 from experiments.thesis.unprinted.where_met import Found, all_met, compared
 from identification.base.errors import InputError
 
@@ -128,7 +128,7 @@ class Loop:
         period, amplitude = self.reference.period_s, self.reference.amplitude
         time_s = np.linspace((PERIODS - 1) * period, PERIODS * period, SAMPLES_PER_PERIOD + 1)
         try:
-            error = simulate(self.prepared.starting_at(output), (-limit, limit), time_s).outputs["error"]
+            error = simulate(self.prepared.starting_at(initial_output=output), (-limit, limit), time_s).outputs["error"]
         except DivergenceError:
             error = np.full(len(time_s), np.nan)
         offset, ripple = over_last(time_s, error, period)
@@ -141,7 +141,7 @@ def loop_of(design: Design) -> Loop:
     """The loop of a design."""
     reference = thesis_reference(design.kind, design.reference_omegas)
     loop = design_loop(design, reference, design.compensator("thesis"))
-    return Loop(design, reference, prepared(loop, design, "exact"))
+    return Loop(design, reference, from_output(loop, design, "exact"))
 
 
 def with_and_without_offset(of: Loop, limit: float) -> dict[float, dict[str, float]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any, NamedTuple
@@ -36,14 +37,14 @@ class Point(NamedTuple):
 
 
 class Prepared(NamedTuple):
-    """A loop from rest, and by how much its initial state moves with the initial output."""
+    """A loop from rest, and by how much a unit of each initial condition moves its state (n,)."""
 
     rest: ReadyLoop
-    held: np.ndarray
+    by: Mapping[str, np.ndarray]
 
-    def starting_at(self, output: float) -> ReadyLoop:
-        """The loop from y(0) = ``output``, see :func:`starting_at`."""
-        return self.rest.starting_from(self.rest.loop.x0 + output * self.held)
+    def starting_at(self, **values: float) -> ReadyLoop:
+        """The loop under initial conditions, of all that move its state; other values are passed over."""
+        return self.rest.starting_from(self.rest.loop.x0 + sum(values[name] * move for name, move in self.by.items()))
 
 
 @dataclass(frozen=True)
@@ -89,29 +90,19 @@ class Conditions:
     def _prepared(self) -> dict[str, Prepared]:
         kinds = {"none": None, "thesis": self.design.compensator("thesis")}
         return {
-            name: prepared(design_loop(self.design, self.reference, kind), self.design, self.delay)
+            name: from_output(design_loop(self.design, self.reference, kind), self.design, self.delay)
             for name, kind in kinds.items()
         }
 
     def loop(self, kind: str, output: float) -> ReadyLoop:
         """The loop "none" (without anti-windup) or "thesis" (with the thesis's) from y(0) = ``output``, see
         :func:`starting_at`."""
-        return self._prepared[kind].starting_at(output)
+        return self._prepared[kind].starting_at(initial_output=output)
 
     def outcomes(self, kind: str, point: Point, samples: int = SAMPLES_PER_PERIOD) -> dict[str, float]:
-        """What the loop of :meth:`loop` comes to in every reading, from so many samples of each of five periods.
-
-        NaN is never; all are NaN when the loop diverges.
-        """
-        period, limit = self.reference.period_s, point.limit
-        time_s = np.linspace(0.0, PERIODS * period, PERIODS * samples + 1)
-        try:
-            run = simulate(self.loop(kind, point.output), (-limit, limit), time_s)
-        except DivergenceError:
-            return dict.fromkeys(OUTCOMES[kind], math.nan)
-        if kind == "none":
-            return without_anti_windup(run, period)
-        return with_anti_windup(run, self.reference.amplitude, period)
+        """Those of :func:`outcomes_of` for the loop of :meth:`loop`."""
+        limits = -point.limit, point.limit
+        return outcomes_of(self.loop(kind, point.output), kind, limits, self.reference, samples)
 
     def both(self, point: Point, samples: int = SAMPLES_PER_PERIOD) -> dict[str, float]:
         """The outcomes of both loops."""
@@ -123,13 +114,42 @@ def _kept(set_name: str, delay: str) -> Conditions:
     return Conditions(set_name, delay)
 
 
-def prepared(loop: SaturatedLoop, design: Design, delay: str) -> Prepared:
-    """A loop of a design with the error as its only output, and the dead time of :attr:`Conditions.delay`."""
+def outcomes_of(
+    loop: ReadyLoop, kind: str, limits: tuple[float, float], reference: Reference, samples: int = SAMPLES_PER_PERIOD
+) -> dict[str, float]:
+    """What a loop "none" or "thesis" comes to in every reading, from so many samples of each of five periods.
+
+    NaN is never; all are NaN when the loop diverges.
+    """
+    period = reference.period_s
+    time_s = np.linspace(0.0, PERIODS * period, PERIODS * samples + 1)
+    try:
+        run = simulate(loop, limits, time_s)
+    except DivergenceError:
+        return dict.fromkeys(OUTCOMES[kind], math.nan)
+    if kind == "none":
+        return without_anti_windup(run, period)
+    return with_anti_windup(run, reference.amplitude, period)
+
+
+def from_output(loop: SaturatedLoop, design: Design, delay: str) -> Prepared:
+    """:func:`prepared` for a loop of a design, to start from any ``initial_output`` as :func:`starting_at` does."""
+    return prepared(loop, {"initial_output": starting_at(loop, design, 1.0).x0 - loop.x0}, delay)
+
+
+def prepared(loop: SaturatedLoop, directions: Mapping[str, np.ndarray], delay: str) -> Prepared:
+    """A loop from rest with the error as its only output, and the dead time of :attr:`Conditions.delay`.
+
+    ``directions`` is what a unit of each initial condition adds to its state (n,).
+    """
     watched = replace(loop, outputs={"error": loop.outputs["error"]})
-    rest, raised = (starting_at(watched, design, output) for output in (0.0, 1.0))
-    if delay == "pade":
-        rest, raised = (with_pade_at_rest(one, PADE_ORDER) for one in (rest, raised))
-    return Prepared(ready_loop(rest), raised.x0 - rest.x0)
+
+    def starting(direction: np.ndarray | float) -> SaturatedLoop:
+        moved = replace(watched, x0=watched.x0 + direction)
+        return with_pade_at_rest(moved, PADE_ORDER) if delay == "pade" else moved
+
+    rest = starting(0.0)
+    return Prepared(ready_loop(rest), {name: starting(by).x0 - rest.x0 for name, by in directions.items()})
 
 
 def starting_at(loop: SaturatedLoop, design: Design, output: float) -> SaturatedLoop:

@@ -5,30 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from design.blocks.block import plant_block
 from design.blocks.state_space import StateSpace, realize
-from experiments.engine.ready_loop import ReadyLoop, ready_loop
+from experiments.engine.ready_loop import ReadyLoop
 from experiments.engine.saturated_loop import SaturatedLoop
-from experiments.engine.simulate import DivergenceError, simulate
 from experiments.runs.design_loop import Controller, plant_loop
 from experiments.runs.disturbances import Disturbances, steps
 from experiments.runs.references import Reference
 from experiments.thesis.printed_choices import chapter_4, thesis_reference
-from experiments.thesis.studies.chapter_4 import PADE_ORDER
-from experiments.thesis.studies.desaturation import PERIODS
-from experiments.thesis.unprinted.chapter_4_conditions import SAMPLES_PER_PERIOD, held_state, with_pade_at_rest
+from experiments.thesis.unprinted.chapter_4_conditions import (
+    SAMPLES_PER_PERIOD,
+    Prepared,
+    held_state,
+    outcomes_of,
+    prepared,
+)
 from experiments.thesis.unprinted.printed_outcomes import (
     COUNTED_FROM_THE_END,
-    OUTCOMES,
     READINGS,
     after_saturation,
-    with_anti_windup,
-    without_anti_windup,
 )
 from experiments.thesis.unprinted.wide_loops import Loops, as_printed, cancelling, usual, without_integrator
 from identification.model.plant import PlantModel
@@ -61,13 +61,6 @@ class Axis(NamedTuple):
             first, last = self.low - self.above, self.high - self.above
             value = self.above + first * (last / first) ** share
         return float(f"{value:.{DIGITS}g}")
-
-
-class Moved(NamedTuple):
-    """A loop from rest, and by how much a unit of each initial condition moves its state (n,)."""
-
-    rest: ReadyLoop
-    by: Mapping[str, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -121,10 +114,10 @@ class Case:
         return *first, *(ranges[name] for name in self.added)
 
     @cached_property
-    def moved(self) -> dict[str, Moved]:
+    def prepared(self) -> dict[str, Prepared]:
         """The loops "none", without anti-windup, and "thesis", with it."""
         plant, none, thesis = self.loops()
-        return {"none": self._moved(plant, none), "thesis": self._moved(plant, thesis)}
+        return {"none": self._prepare(plant, none), "thesis": self._prepare(plant, thesis)}
 
     def outcomes(self, kind: str, values: Mapping[str, float], samples: int = SAMPLES_PER_PERIOD) -> dict[str, float]:
         """What a loop comes to in every reading, from so many samples of each of five periods.
@@ -143,42 +136,25 @@ class Case:
         dict
             NaN is never; all are NaN when the loop diverges.
         """
-        period, upper = self.reference.period_s, values["upper"]
-        time_s = np.linspace(0.0, PERIODS * period, PERIODS * samples + 1)
-        try:
-            run = simulate(self.started(kind, values), (-values.get("lower", upper), upper), time_s)
-        except DivergenceError:
-            found = dict.fromkeys(OUTCOMES[kind], math.nan)
-        else:
-            with_it = partial(with_anti_windup, amplitude=self.reference.amplitude)
-            found = (with_it if kind == "thesis" else without_anti_windup)(run, span_s=period)
+        limits = -values.get("lower", values["upper"]), values["upper"]
+        found = outcomes_of(self.started(kind, values), kind, limits, self.reference, samples)
         return after_saturation(found) if kind == "thesis" else found
 
     def started(self, kind: str, values: Mapping[str, float]) -> ReadyLoop:
-        """A loop of :attr:`moved` under the initial conditions and the disturbance of ``values``."""
-        rest, by = self.moved[kind]
-        started = rest.starting_from(rest.loop.x0 + sum(values[name] * move for name, move in by.items()))
+        """A loop of :attr:`prepared` under the initial conditions and the disturbance of ``values``."""
+        started = self.prepared[kind].starting_at(**values)
         if "disturbance" not in values:
             return started
-        resets = replace(
-            rest.loop.resets,
-            times_s=np.array([values["disturbance_s"]]),
-            values=values["disturbance"] * rest.loop.resets.values,
-        )
+        unit = started.loop.resets
+        resets = replace(unit, times_s=np.array([values["disturbance_s"]]), values=values["disturbance"] * unit.values)
         return replace(started, loop=replace(started.loop, resets=resets))
 
-    def _moved(self, plant: PlantModel, controller: Controller) -> Moved:
+    def _prepare(self, plant: PlantModel, controller: Controller) -> Prepared:
         unit_step = steps([(1.0, 1.0)] if "disturbance" in self.added else [])
         loop = plant_loop(controller, plant, self.reference, Disturbances(output=unit_step))
-        loop = replace(loop, outputs={"error": loop.outputs["error"]})
-
-        def starting(direction: np.ndarray | float) -> SaturatedLoop:
-            moved = replace(loop, x0=loop.x0 + direction)
-            return with_pade_at_rest(moved, PADE_ORDER) if self.delay == "pade" else moved
-
-        rest, directions = starting(0.0), _directions(plant, controller, loop, self.reference.omegas[0])
+        directions = _directions(plant, controller, loop, self.reference.omegas[0])
         wanted = ("initial_output", *(name for name in self.added if name in directions))
-        return Moved(ready_loop(rest), {name: starting(directions[name]).x0 - rest.x0 for name in wanted})
+        return prepared(loop, {name: directions[name] for name in wanted}, self.delay)
 
 
 def _directions(plant: PlantModel, controller: Controller, loop: SaturatedLoop, omega: float) -> dict[str, np.ndarray]:

@@ -95,7 +95,7 @@ def wide_conditions_table(cases: Sequence[Case] | None = None, each: Each = thre
 
 def _searched(case: Case, first: Sequence[Tried], each: Each) -> dict[bool, Tried]:
     """The nearest point whose error converges, and the nearest one of all."""
-    _ = case.axes, case.moved  # before the threads ask for them
+    _ = case.axes, case.prepared  # before the threads ask for them
     covering = qmc.Sobol(len(case.axes), scramble=False).random_base2(COVERING)
     jobs = [(case, shares, 1.0) for shares in covering]
     jobs += [(case, _widened(case, point.shares), math.inf) for point in first]
