@@ -33,7 +33,7 @@ from identification.model.modes import Mode
 from identification.model.plant import PlantModel
 from paper_figures.explore.nyquist import Nyquist, nyquist_of
 from paper_figures.explore.state import Choices, State, TruePlant
-from paper_figures.look.stretches import merged
+from paper_figures.look.fast_swings import merged
 
 KEPT = 32  # designs and linear loops that are remembered
 SAMPLES = 2001  # of a run

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from identification.base.arrays import Real
-from paper_figures.look.stretches import merged
 
 TURNS, WITHIN = 6, 5.0  # so many turns in so many points of the page are a smear
 SEEN = 0.03  # of the height of the panel: a smaller swing only makes the line look broader
@@ -53,6 +52,16 @@ def fast_stretches(panel: Axes, x: Real, y: Real) -> Real:
 def swing_range(x: Real, y: Real) -> tuple[Real, Real, Real]:
     """Return the places at which a fast line turns, and the least and the largest of the turns around each."""
     turns = turns_of(y, 0.0)
-    lower, upper = (over(y[turns], TURNS - 1, mode="nearest") for over in (minimum_filter1d, maximum_filter1d))
+    around = sliding_window_view(np.pad(y[turns], TURNS // 2 - 1, mode="edge"), TURNS - 1)
+    lower, upper = around.min(axis=1), around.max(axis=1)
     starts = np.arange(0, len(turns), -(-len(turns) // MOST_CORNERS))
     return x[turns][starts], np.minimum.reduceat(lower, starts), np.maximum.reduceat(upper, starts)
+
+
+def merged(stretches: Real, gap_s: float) -> Real:
+    """The stretches (n, 2) as they are seen: those less than a gap apart are one."""
+    if not len(stretches):
+        return stretches
+    new = np.append(True, stretches[1:, 0] - stretches[:-1, 1] > gap_s)
+    last = np.append(new[1:], True)
+    return np.column_stack([stretches[new, 0], stretches[last, 1]])

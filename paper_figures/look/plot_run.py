@@ -16,9 +16,10 @@ from experiments.engine.simulate import Run, limit_pair
 from identification.base.arrays import Real
 from identification.base.errors import InputError
 from identification.model.signals import UNNAMED, Signals
+from paper_figures.look.fast_swings import merged
 from paper_figures.look.frequency_axis import plain
 from paper_figures.look.panels import MOST_POINTS, band, envelope, key, paler, view
-from paper_figures.look.stretches import merged, saturated_stretches
+from paper_figures.look.stretches import saturated_stretches
 from paper_figures.look.style import FAMILY, FULL_WIDTH, LINES, panel_letters, styled
 
 AnyRun = Run | SampledRun

@@ -40,12 +40,3 @@ def saturated_stretches(run: Run | SampledRun, limits: tuple[float, float]) -> R
     turns = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
     stretches = np.append(edges, last)[turns].reshape(-1, 2)
     return np.asarray(stretches[stretches[:, 1] > stretches[:, 0]])
-
-
-def merged(stretches: Real, gap_s: float) -> Real:
-    """The stretches (n, 2) as they are seen: those less than a gap apart are one."""
-    if not len(stretches):
-        return stretches
-    new = np.append(True, stretches[1:, 0] - stretches[:-1, 1] > gap_s)
-    last = np.append(new[1:], True)
-    return np.column_stack([stretches[new, 0], stretches[last, 1]])

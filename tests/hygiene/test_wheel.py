@@ -103,6 +103,14 @@ def test_the_help_imports_no_room() -> None:
     assert not {"scipy", "design.__main__"} & set(done.stdout.splitlines()[-1].split())
 
 
+def test_a_figure_of_runs_imports_no_engine() -> None:
+    """It is drawn of tables: to load compiled code takes longer than to draw."""
+    code = "import sys, paper_figures.result_tables, paper_figures.thesis.figures.fig_4_01; print(*sys.modules)"
+    loaded = set(run(sys.executable, "-c", code, cwd=ROOT).stdout.split())
+    assert "paper_figures.look.panels" in loaded
+    assert not {"numba", "scipy"} & loaded
+
+
 @pytest.mark.parametrize(
     ("missing", "arguments"),
     [
