@@ -71,7 +71,10 @@ def delay_free(
     bandwidth: float | None,
     output: Path,
 ) -> None:
-    """Design by chapter 2: internal model, H-infinity stabiliser, anti-windup. The plant's dead time is ignored."""
+    """Design by chapter 2, without the dead time.
+
+    The design has an internal model, an H-infinity stabiliser and an anti-windup. It ignores the plant's dead time.
+    """
     from design.asked_model import asked_model
     from design.chapter_2.design_delay_free import design_delay_free
 
@@ -153,10 +156,10 @@ def extended(
     bandwidth: float | None,
     output: Path,
 ) -> None:
-    """Design by chapters 3 and 4: controller and anti-windup with the exact dead time, for every plant.
+    """Design by chapters 3 and 4, for every plant.
 
-    --reference-hz 0.5 is enough: the command then chooses the rest from the reference, the dead time and W_a, and
-    prints each choice with its reason.
+    The controller and its anti-windup take the exact dead time into account. --reference-hz 0.5 is enough: the
+    command then chooses the rest from the reference, the dead time and W_a, and prints each choice with its reason.
     """
     from design.asked_model import asked_model
     from design.chapters_3_4.design_extended import design_extended
@@ -192,7 +195,10 @@ def extended(
 @click.option("--denominator", required=True, help="Coefficients of the denominator, highest power first.")
 @OUTPUT
 def anti_windup_command(design: Path, name: str, numerator: str, denominator: str, output: Path) -> None:
-    """Add your own anti-windup theta1~ (strictly proper and stable) to DESIGN."""
+    """Add your own anti-windup theta1~ to DESIGN.
+
+    theta1~ must be strictly proper and stable.
+    """
     from design.anti_windup.compensator import anti_windup
     from design.anti_windup.judge import Compensator, judge
     from design.blocks.block import from_polynomial
@@ -228,7 +234,11 @@ def anti_windup_command(design: Path, name: str, numerator: str, denominator: st
     help="Draw the Nyquist curve with the discs of W_a, |S|, |T| and |W_a C S| to this file: .pdf, .svg or .png.",
 )
 def audit_command(design: Path, windup: float, figure: Path | None) -> None:
-    """Print stability, margins and |W_a C S| of DESIGN with the exact dead time, and judge its anti-windups."""
+    """Judge DESIGN with the exact dead time.
+
+    The command prints the characteristic roots, the margins and |W_a C S| of the linear loop. Then it judges each
+    anti-windup of DESIGN and compares it with no anti-windup.
+    """
     from design.auditing.as_text import audit_text
     from design.auditing.audit_design import audit
     from design.design_file import read_design

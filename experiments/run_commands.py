@@ -89,7 +89,10 @@ def simulate_command(
     figure: Path | None,
     **reference: Any,
 ) -> None:
-    """Run DESIGN from rest; write time_s, reference, output, error, control, saturated_control (and measured)."""
+    """Run DESIGN from rest in continuous time.
+
+    The columns are time_s, reference, output, error, control and saturated_control; with --noise also measured.
+    """
     import numpy as np
     import pandas as pd
     from tqdm import tqdm
@@ -211,8 +214,9 @@ def sampled_command(
     figure: Path | None,
     **reference: Any,
 ) -> None:
-    """Run DESIGN's controller on a computer with a real actuator; write a row for each sample.
+    """Run DESIGN's controller on a computer.
 
+    The actuator may have levels, a rate limit and a delay. The command writes a row for each sample.
     The columns are those of `simulate`: control is the command of the computer, saturated_control the output of the
     actuator.
     """

@@ -205,9 +205,11 @@ def fit(
     figure: Path | None,
     **reading: Any,
 ) -> None:
-    """Fit a plant (gain, integrators, modes, real roots, dead time) and its bound W_a to SWEEP files.
+    """Fit a plant and its bound W_a to SWEEP files.
 
-    A SWEEP is a raw record or a frequency response."""
+    The plant has a gain, integrators, modes, real roots and a dead time. A SWEEP is a raw record or a frequency
+    response.
+    """
     from tqdm import tqdm
 
     from identification.fit_model import fit_model
