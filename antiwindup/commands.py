@@ -143,7 +143,7 @@ def _asked(
     from identification.sweeps.input_files import input_files
 
     if not output or true_path(Path(output)) == Path(true_path(Path(output)).anchor):
-        raise InputError(f"--output is {shown(output)}; expected a folder for the outputs alone")
+        raise InputError(f"--output is {shown(output)}; expected a folder that holds nothing but the outputs")
     if limit is not None and not 0 < limit < inf:
         raise InputError(f"--limit is {limit:g}; expected a positive number")
     for name in (*sweeps, *([model] if model else ()), output):

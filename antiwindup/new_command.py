@@ -21,7 +21,7 @@ def new(path: Path, force: bool) -> None:
     comment at first. `refit` and the other commands read the file with --axis.
     """
     if not force and is_there(path):
-        raise InputError(f"{path}: is there already; expected another name, or --force")
+        raise InputError(f"{path}: exists already; expected another name, or --force")
     require_writable(path)
     write_whole({path: axis_text({}, {})})
-    click.echo(f"-> {path}: take the # away from the lines that you know")
+    click.echo(f"-> {path}: remove the # from the lines that you fill in")

@@ -79,8 +79,8 @@ def delay_free(
     from design.chapter_2.design_delay_free import design_delay_free
 
     if (epsilon is None) != integral_action:
-        found = "both are given" if integral_action else "none is given"
-        raise InputError(f"of --epsilon and --integral-action {found}; expected one of them")
+        found = "both --epsilon and {} are" if integral_action else "neither --epsilon nor {} is"
+        raise InputError(f"{found.format('--integral-action')} given; expected one of them")
     frequencies = asked_frequencies(hertz, omegas)
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
@@ -286,14 +286,13 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
 
 
 def _on_the_plant_with_its_dead_time(design: Design) -> str:
-    from design.stability.characteristic_roots import roots_right_of
+    from design.stability.characteristic_roots import roots_right_of, unstable_roots
     from design.stability.margins import delay_loop
 
     if not design.plant.delay_s:
         return ""
     count = roots_right_of(delay_loop(design, design.plant), 0.0)
-    roots = f"{count} root{'s' if count > 1 else ''} in the right half plane"
-    found = f"UNSTABLE ({roots}): for it there is design extended" if count else "stable too"
+    found = f"UNSTABLE ({unstable_roots(count)}): use the command extended" if count else "stable too"
     return (
         f"\n  with the plant's dead time of {design.plant.delay_s:g} s, which this design ignores, the loop is {found}"
     )

@@ -216,9 +216,8 @@ def sampled_command(
 ) -> None:
     """Run DESIGN's controller on a computer.
 
-    The actuator may have levels, a rate limit and a delay. The command writes a row for each sample.
-    The columns are those of `simulate`: control is the command of the computer, saturated_control the output of the
-    actuator.
+    The actuator may have levels, a rate limit and a delay. The command writes a row for each sample. The columns are
+    those of `simulate`: control is the command of the computer, saturated_control the output of the actuator.
     """
     import pandas as pd
     from tqdm import tqdm
@@ -262,7 +261,7 @@ def sampled_command(
         found = verdict(guarantee(content, kind, true), run.time_s, run.control, steady, drive.limits)
         promised = str(found)
         if found.covered:
-            promised = f"No guarantee on a computer; in continuous time the run would be within it: {found.needs}"
+            promised = f"No guarantee on a computer; in continuous time it would cover the run: {found.needs}"
     columns = {name: values for name, values in vars(run).items() if values is not None}
     writers = {output: csv_writer(pd.DataFrame(columns))}
     if figure is not None:
@@ -281,9 +280,9 @@ def _unpromised(disturbed: bool, slow: bool, rounds: bool = False) -> str:
     if disturbed:
         return "Whether the guarantee covers the run is not judged under disturbances"
     if slow:
-        return "No guarantee: the actuator was too slow for the control, and a guarantee is of limits alone"
+        return "No guarantee: the rate limit acted, and the guarantee covers saturation limits alone"
     if rounds:
-        return "No guarantee: the actuator rounds the control, and a guarantee is of limits alone"
+        return "No guarantee: the actuator has levels, and the guarantee covers saturation limits alone"
     return ""
 
 

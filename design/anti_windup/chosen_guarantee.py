@@ -75,6 +75,6 @@ def why_not_global(unstable: Sequence[complex]) -> str:
     if len(unstable) > 1:
         return (
             f"no guarantee for every control exists: for {len(unstable)} integrators 1 + theta1~ falls like "
-            f"s^{len(unstable)} at s = 0, and no positive real function faster than s"
+            f"s^{len(unstable)} at s = 0, and no positive real function falls faster than s"
         )
     return ""

@@ -28,7 +28,7 @@ def first_sentence(found: ModelCheck) -> str:
         reasons[0] += " but for noise" if any(map(_is_beyond, found.sweeps)) else ""
         reasons += ["no parameter moved by more than chance"] if "parameters" in held else []
         untold = dict.fromkeys(each.question for each in given if each.outcome is Outcome.OPEN)
-        rest = f"; not told: {', '.join(untold)}" if untold else ""
+        rest = f"; unknown: {', '.join(untold)}" if untold else ""
         return f"Nothing to do: {', '.join([*reasons, *_design_keeps(held)])}{rest}"
     outcomes = {each.outcome for each in given}
     todo = "Fit a new model"

@@ -62,8 +62,8 @@ class Reference:
         for amplitude, omega, phase in zip(self.amplitudes, self.omegas, self.phases_rad, strict=True):
             if amplitude != 0 and omega == 0 and math.sin(phase) == 0:
                 raise InputError(
-                    f"the reference of frequency 0 has the phase {phase:g}, with which it is 0 at all times; expected "
-                    "the phase pi/2, with which it is the constant of its amplitude"
+                    f"the reference of frequency 0 has the phase {phase:g}, which makes it 0 at all times; expected "
+                    "pi/2, which makes it a constant of its amplitude"
                 )
         numbers = {
             "amplitude": self.amplitudes,

@@ -117,7 +117,7 @@ def _trimmed(test: FrequencyResponse, noisy: Flags) -> FrequencyResponse:
         if total.max() >= LEAST:
             kept[side][: int(np.argmax(total)) + 1] = False
     if not kept.any():
-        raise InputError(f"{test.name}: every line is more noise than response; expected lines that show the plant")
+        raise InputError(f"{test.name}: noise exceeds the response at every line; expected less noise")
     return only(test, kept, "more noise than response")
 
 

@@ -123,7 +123,7 @@ class FrequencyResponse:
         if not (np.isfinite(omega).all() and np.isfinite(response).all()):
             raise InputError(f"{self.name}: omega or response is not finite; expected finite numbers")
         if omega[0] <= 0 or np.any(np.diff(omega) <= 0):
-            raise InputError(f"{self.name}: omega is not positive and increasing; expected that, without duplicates")
+            raise InputError(f"{self.name}: omega is not increasing from above 0; expected that, without duplicates")
 
     def __repr__(self) -> str:
         low, high = self.omega[[0, -1]] / (2 * np.pi)

@@ -165,7 +165,8 @@ def test_bad_exceptions_are_refused(content: str, part: str, tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("content", "part"), [("{", "line 1: "), ("[]", "expected an object"), ("{}", "with text_sha")]
+    ("content", "part"),
+    [("{", "line 1: "), ("[]", "expected an object"), ("{}", "the members are none; expected text_sha")],
 )
 def test_bad_records_are_refused(content: str, part: str, tmp_path: Path):
     path = tmp_path / "coverage.json"

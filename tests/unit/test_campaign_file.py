@@ -111,7 +111,7 @@ def test_a_part_with_any_bit_changed_runs_again(campaign: Campaign, design: Path
         damaged[place] ^= 1 << rng.integers(8)
         part.write_bytes(damaged)
         assert CampaignFile(file.output, campaign, PLANTS, design).missing == [(0, 2)]
-    with pytest.raises(InputError, match="has been changed meanwhile; give the same command"):
+    with pytest.raises(InputError, match="was changed during the run; give the same command"):
         file.finish()
     assert not file.output.exists()
     again, alone = kept(file.output, campaign, design), kept(tmp_path / "alone.parquet", campaign, design)

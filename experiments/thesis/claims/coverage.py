@@ -137,7 +137,7 @@ def read_record(path: Path = RECORD) -> dict[str, Any]:
     """
     content = read_object(path)
     if list(content) != list(RECORDED):
-        raise InputError(f"{path}: expected an object with {', '.join(RECORDED)}")
+        raise InputError(f"{path}: the members are {', '.join(content) or 'none'}; expected {', '.join(RECORDED)}")
     return content
 
 
