@@ -172,8 +172,9 @@ def tabulate(rows: Rows, n: int, k: int, step: float) -> tuple[Tables, int]:
 
 @njit(nogil=True)
 def _laid_out(responses: Array, rows: int, degree: int, n: int, k: int) -> Array:
-    """The first ``rows`` of responses (p, ., n + 1 + k) to x_0, m and w_0 as rows over z, by degree; w_i has its i degrees
-    later.
+    """Of responses (p, ., n + 1 + k) to x_0, m and w_0 the first ``rows``, as rows over z, by degree.
+
+    w_i has its i degrees later.
     """
     table = np.zeros((rows * (degree + 1), n + 1 + k * (degree + 1)))
     for p in range(degree + 1):
