@@ -71,7 +71,7 @@ def integrate(
     places = np.empty(bounds.events)
 
     # not literal, and loops instead of arrays' sums: numba would compile several seconds longer
-    pieces = queued = on_limit = roots = usual = np.int64(0)
+    pieces = queued = on_limit = roots = usual = int(np.int64(0))
     # the sources of the delayed signals, one polynomial a step, the step p at p % room, and where each dead time reads
     starts, lates, radii, degrees = np.empty(room), np.empty(room), np.empty(room), np.empty(room, np.int64)
     history = np.empty((room, k, most + 1))

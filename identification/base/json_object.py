@@ -26,8 +26,9 @@ def read_json(path: Path, schema: int) -> dict[str, Any]:
         Another schema, or see :func:`read_object`.
     """
     content = read_object(path)
-    if content.get("schema") != schema:
-        raise InputError(f"{path}: schema is {shown(content.get('schema'))}; expected {schema}")
+    found = content.get("schema")
+    if isinstance(found, bool) or found != schema:
+        raise InputError(f"{path}: schema is {shown(found)}; expected {schema}")
     return content
 
 
