@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from identification.base.errors import InputError
-from identification.base.json_object import member, read_json
+from identification.base.json_object import member, read_json, require_known
 from identification.model.additive_bound import AdditiveBound
 from identification.model.fit_record import FitRecord, Numbers
 from identification.model.plant import PlantModel
@@ -73,10 +73,10 @@ class IdentifiedModel:
             table["standard error"] = self.standard_errors
         return f"<p>{escape(repr(self))}</p>{table.to_html(index=False)}"
 
-    def to_json(self) -> str:
-        """The text of model.json; every number is finite or this raises ValueError."""
+    def to_dict(self) -> dict[str, Any]:
+        """The object of model.json."""
         errors = self.standard_errors
-        content = {
+        return {
             "schema": SCHEMA,
             "signals": self.signals.to_dict(),
             "plant": plant_to_dict(self.plant),
@@ -84,7 +84,10 @@ class IdentifiedModel:
             "additive_bound": bound_to_dict(self.additive_bound),
             "fit": {} if self.fit is None else self.fit.to_dict(self.plant),
         }
-        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+    def to_json(self) -> str:
+        """The text of model.json; every number is finite or this raises ValueError."""
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
 
 
 def read_model(path: Path | str) -> IdentifiedModel:
@@ -93,7 +96,7 @@ def read_model(path: Path | str) -> IdentifiedModel:
     Raises
     ------
     InputError
-        No such file, not JSON, another schema, or a number missing or out of range.
+        No such file, not JSON, another schema, a member that is not known, or a number missing or out of range.
     """
     content = read_json(Path(path), SCHEMA)
     try:
@@ -102,9 +105,11 @@ def read_model(path: Path | str) -> IdentifiedModel:
         signals = Signals.from_dict(member(content, "signals")) if "signals" in content else UNNAMED
         errors = _recorded(content, "standard_errors", lambda found: from_shape(plant, found))
         fit = _recorded(content, "fit", lambda found: FitRecord.from_dict(found, plant, bound))
+        model = IdentifiedModel(plant, bound, errors, fit, signals)
+        require_known(content, model.to_dict())
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return IdentifiedModel(plant, bound, errors, fit, signals)
+    return model
 
 
 def _recorded(content: Mapping[str, Any], key: str, read: Callable[[Mapping[str, Any]], Record]) -> Record | None:
