@@ -26,8 +26,9 @@ def read_json(path: Path, schema: int) -> dict[str, Any]:
         Another schema, or see :func:`read_object`.
     """
     content = read_object(path)
-    if content.get("schema") != schema:
-        raise InputError(f"{path}: schema is {shown(content.get('schema'))}; expected {schema}")
+    found = content.get("schema")
+    if isinstance(found, bool) or found != schema:
+        raise InputError(f"{path}: schema is {shown(found)}; expected {schema}")
     return content
 
 
@@ -87,6 +88,34 @@ def objects(content: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
     if not isinstance(values, list) or not all(isinstance(value, Mapping) for value in values):
         raise InputError(f"{shown(key)} is {shown(values)}; expected a list of objects")
     return values
+
+
+def require_known(content: Any, known: Any, place: str = "") -> None:
+    """Require that every member of a JSON document is known: a misspelt one that may be left out would not be missed.
+
+    Parameters
+    ----------
+    content
+        The document.
+    known
+        What the program writes of it after it was read.
+    place
+        Where in a file it stands.
+
+    Raises
+    ------
+    InputError
+        A member is not known.
+    """
+    if isinstance(content, list) and isinstance(known, list | tuple):
+        for own, other in zip(content, known, strict=False):
+            require_known(own, other, place)
+    if not isinstance(content, Mapping) or not isinstance(known, Mapping):
+        return
+    for key, value in content.items():
+        if key not in known:
+            raise InputError(f"{place or 'the file'} has the member {shown(key)}; expected one of {', '.join(known)}")
+        require_known(value, known[key], f"{shown(key)}")
 
 
 def number(content: Mapping[str, Any], key: str) -> float:

@@ -30,6 +30,7 @@ MODEL, DESIGN = (
     for file in ("identification/model/model.schema.json", "design/design.schema.json")
 )
 OTHER_TYPES = (None, "text", 7.5, {})
+NAMES_OF_OWN = ("Q", "by_structure")  # whose members have names that no schema knows
 DERIVED = "said"  # what the writer makes of its neighbours and no reader reads
 
 Content = dict[str, Any]
@@ -154,6 +155,19 @@ def test_the_schema_takes_what_the_reader_keeps(name: str, documents: Mapping[st
     }
     assert {valid for valid, _ in found.values()} == {True, False}
     assert [mutant for mutant, (valid, kept) in found.items() if valid != kept] == []
+
+
+@pytest.mark.parametrize("name", ["model", "model of a wider bound", "extended", "delay-free"])
+def test_no_member_is_passed_over(name: str, documents: Mapping[str, Content], tmp_path: Path) -> None:
+    """A misspelt member that may be left out would otherwise be taken for one that was left out."""
+    path, read = tmp_path / "a.json", read_model if name.startswith("model") else read_design
+    path.write_text(json.dumps(documents[name]), encoding="utf-8")
+    read(path)
+    for mutant, changed in mutants(documents[name]):
+        if ("one more" in mutant or "renamed" in mutant) and not any(f"'{each}'" in mutant for each in NAMES_OF_OWN):
+            path.write_text(json.dumps(changed), encoding="utf-8")
+            with pytest.raises(InputError):
+                pytest.fail(f"{mutant}: {read(path)}")
 
 
 @pytest.mark.parametrize("change", [{}, {"sector": None}, {"certificate": [[1.0]]}, {"guarantee": "global"}])
