@@ -165,7 +165,7 @@ def extended(
     from design.chapters_3_4.design_extended import design_extended
 
     if len(e) != len(f):
-        raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected as many")
+        raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected equal numbers")
     frequencies = asked_frequencies(hertz, omegas)
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
@@ -280,7 +280,7 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
     for name, each in design.anti_windup.items():
         judged = each.judgement
         sector = "any" if judged.popov_sector is None else lower_end(judged.popov_sector, 4)
-        stable = "stable" if judged.theta2_stable else "NOT stable: a lasting offset after saturation"
+        stable = "stable" if judged.theta2_stable else "NOT stable: saturation leaves an offset for ever"
         click.echo(f"  anti-windup {name:9s} f = {judged.f:.4g}, Popov sector {sector}, theta2 {stable}")
     click.echo(f"  guarantee of the corrected one: {design.corrected.guarantee}, {design.corrected.guarantee_said}")
 

@@ -113,7 +113,7 @@ def simulate_command(
     limits = asked_limits(limit)
     if not 0 < sample_time <= until < math.inf:
         raise InputError(
-            f"--until is {until:g} and --sample-time {sample_time:g}; expected 0 < sample time <= until, both finite"
+            f"--until is {until:.12g} and --sample-time {sample_time:.12g}; expected 0 < sample time <= until < inf"
         )
     _require_few_rows(until / sample_time)
     numbers = {name: value for name, value in (("alpha", alpha), ("beta", beta), ("gamma", gamma)) if value is not None}
@@ -293,7 +293,7 @@ def _first(promised: str, said: str) -> str:
 
 def _require_few_rows(rows: float) -> None:
     if rows > MOST_ROWS:
-        raise InputError(f"{rows:.3g} rows are asked for; expected at most {MOST_ROWS:.3g}")
+        raise InputError(f"the output has {rows:.3g} rows; expected at most {MOST_ROWS:.3g}")
 
 
 def _inputs(design: Path, plant: str | None, reference: Path | None) -> list[Path]:

@@ -54,7 +54,7 @@ def chosen_guarantee(
     return (
         guarantee,
         PositiveReal(robustness),
-        f"for every plant within W_a with as many poles in the right half plane {ends}; {shown}",
+        f"for every plant within W_a with as many poles in the right half plane as the model {ends}; {shown}",
     )
 
 

@@ -112,8 +112,8 @@ def corrected(
     slowest = float(np.log(1 / SETTLED)) / recovery_s
     if not slowest * (1 - 1e-9) <= bandwidth < np.inf:
         raise InputError(
-            f"the bandwidth of the anti-windup is {bandwidth:.6g} rad/s; expected a finite one of at least "
-            f"{slowest:.6g} rad/s, which the recovery in {recovery_s:g} s needs"
+            f"the bandwidth of the anti-windup is {bandwidth:.9g} rad/s; expected a finite one of at least "
+            f"{slowest:.9g} rad/s, which the recovery in {recovery_s:g} s needs"
         )
     decades = min(float(np.log10(bandwidth / slowest)) + 1e-9, DECADES if faster else np.inf)
     slowest = bandwidth / 10**decades

@@ -144,7 +144,7 @@ def _margin_lines(margins: Margins | str | None) -> Iterable[str]:
     if not isinstance(margins, Margins):
         return [f"  no margins                      {margins}"]
     guarantee = (
-        "the loop around every plant within W_a with as many poles in Re s > 0 is stable"
+        "the loop is stable with every plant within W_a that has as many poles in Re s > 0 as the model"
         if margins.is_guaranteed
         else "NO guarantee for the plants within W_a"
     )

@@ -112,7 +112,7 @@ def internal_model(
 
 
 def _require_reference(omegas: Sequence[float], epsilon: float | None) -> None:
-    shown = ", ".join(f"{omega:g}" for omega in omegas)
+    shown = ", ".join(f"{omega:.12g}" for omega in omegas)
     if len(set(omegas)) < len(omegas):
         raise InputError(f"the reference has omega = {shown} rad/s; expected each frequency once")
     if len(omegas) and min(omegas) == 0:
@@ -124,7 +124,7 @@ def _require_reference(omegas: Sequence[float], epsilon: float | None) -> None:
     if not (len(omegas) and all(np.isfinite(omega) and omega > 0 for omega in omegas)):
         raise InputError(f"the reference has omega = {shown} rad/s; expected one or more positive numbers")
     if epsilon is not None and not 0 < epsilon < min(omegas) ** 2:
-        raise InputError(f"omega = {shown} rad/s and epsilon = {epsilon:g}; expected 0 < epsilon < omega^2")
+        raise InputError(f"omega = {shown} rad/s and epsilon = {epsilon:.12g}; expected 0 < epsilon < omega^2")
 
 
 def _require_class(plant: PlantModel) -> None:

@@ -162,7 +162,7 @@ def robust_outer_part(
     if met:
         return min(met, key=lambda redesign: redesign.sensitivity)
     raise InputError(
-        f"||W_a C S|| is {best:.4g} or more with every roll-off tried, of up to {orders[-1]} poles; expected at most "
+        f"||W_a C S|| is {best:.6g} or more with every roll-off tried, of up to {orders[-1]} poles; expected at most "
         f"{level:g}, for example by a smaller a, e and f (every controller has {floor:.4g} or more)"
     )
 
@@ -187,7 +187,7 @@ def require_possible(
         beyond = at[int(np.argmax(values))]
         accepted = "a level above that, or " if floor < 1 else ""
         raise InputError(
-            f"|W_a C S| is |W_a/P| = {floor:.4g} at {beyond:.6g} rad/s with every controller that follows a reference "
+            f"|W_a C S| is |W_a/P| = {floor:.6g} at {beyond:.6g} rad/s with every controller that follows a reference "
             f"there; expected less than the level {level:g}: {accepted}{_known(plant, bound, level, band)}"
         )
     return floor

@@ -68,7 +68,7 @@ def rightmost_roots(loop: DelayLoop, count: int) -> CharacteristicRoots:
     argument principle counts right of a line just left of them.
     """
     if count < 1:
-        raise InputError(f"{count} roots were asked for; expected one or more")
+        raise InputError(f"the number of roots is {count}; expected 1 or more")
     if loop.is_predicted:
         roots = np.array(loop.denominator.zeros)
         return _with_hidden(loop, roots, np.zeros(len(roots)), -np.inf)

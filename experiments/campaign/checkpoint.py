@@ -121,7 +121,7 @@ class CampaignFile:
             self.folder.rmdir()
         if self.folder.exists():
             left = min(path.name for path in self.folder.iterdir())
-            click.echo(f"{self.folder} stays, since it holds {left}, which is no part of the campaign", err=True)
+            click.echo(f"{self.folder} is kept, since it holds {left}, which does not belong to the campaign", err=True)
 
     def _join(self, partial: Path) -> None:
         import pyarrow

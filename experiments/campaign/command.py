@@ -42,7 +42,7 @@ plant_options = together(
     type=int,
     help=(
         "Length of a run in periods of the reference. Default: 5, or as many as the loop needs to "
-        "settle; half as many again where a run settles later than its poles say."
+        "settle; 1.5 times that where a run settles later than its poles say."
     ),
 )
 @sinusoid_options

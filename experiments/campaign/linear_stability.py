@@ -105,7 +105,7 @@ class PerturbedLoop:
         if len(true.unstable_poles) != len(self.plant.unstable_poles):
             raise InputError(
                 f"the true plant has {len(true.unstable_poles)} poles in the right half plane, the model "
-                f"{len(self.plant.unstable_poles)}; expected as many"
+                f"{len(self.plant.unstable_poles)}; expected equal numbers"
             )
         modes = [*true.zero_modes, *true.pole_modes]
         around = [mode.omega * np.exp(min(abs(mode.zeta), 0.1) * AROUND) for mode in modes]

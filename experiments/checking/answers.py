@@ -170,7 +170,7 @@ def _parameters(found: ModelCheck, sweep: SweepCheck) -> tuple[Outcome, str]:
             f"{named(move.parameter)} differs {_by(move)}, and {_least(move)}" for move in open_moves[:NAMED]
         )
         tests = f"{len(record.tests)} test{'s are' if len(record.tests) > 1 else ' is'}"
-        return Outcome.OPEN, f"{tests} too few to tell whether a parameter moved: {words}"
+        return Outcome.OPEN, f"{tests} too few to show whether a parameter moved: {words}"
     none = "no parameter moved by more than chance"
     none += f"; {named(first.parameter)}, which differs {_by(first)}, comes nearest to a move"
     none += f" ({_least(first)})" if first.could_be_told else ""

@@ -72,7 +72,7 @@ def matched_controller(
         )
     if not fastest * T < np.pi:
         raise InputError(
-            f"the rate is {1 / T:.6g} Hz and the reference has {fastest / (2 * np.pi):.6g} Hz; expected more than "
+            f"the rate is {1 / T:.9g} Hz and the reference has {fastest / (2 * np.pi):.9g} Hz; expected more than "
             "twice the reference's frequency"
         )
     P_d, samples = held_plant(design.plant, T)

@@ -87,7 +87,7 @@ def limit_pair(limits: float | Sequence[float]) -> tuple[float, float]:
         )
     low, high = (-float(pair[0]), float(pair[0])) if pair.size == 1 else (float(pair[0]), float(pair[1]))
     if not low < high:
-        raise InputError(f"the saturation limits are {low:g} and {high:g}; expected the lower one first")
+        raise InputError(f"the saturation limits are {low:.12g} and {high:.12g}; expected the lower one first")
     return low, high
 
 

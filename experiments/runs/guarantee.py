@@ -22,7 +22,7 @@ from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
 FINE = 200  # frequencies a decade where a true plant is compared with the bound
-OUTSIDE = "the true plant is not within W_a of the design's model, with as many poles in the right half plane"
+OUTSIDE = "the true plant is not within W_a of the model, or has another number of poles in the right half plane"
 TURNED = 1.0  # rad between neighbouring frequencies, beyond which exp(-j omega (h' - h)) may be anything
 
 

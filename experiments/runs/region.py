@@ -7,6 +7,7 @@ import math
 
 from experiments.runs.references import Reference, SampledReference
 from experiments.runs.steady_control import Wave, peak, response, steady_constant
+from identification.base.digits import lower_end
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
@@ -80,8 +81,8 @@ def require_short(plant: PlantModel, until_s: float) -> None:
     if until_s > longest:
         fastest = GROWTH / longest
         raise InputError(
-            f"the run lasts {until_s:g} s; expected at most {longest:.4g} s, since the plant's pole at {fastest:.4g} "
-            "rad/s in the right half plane amplifies rounding errors (the command sampled has no such limit)"
+            f"the run lasts {until_s:.9g} s; expected at most {lower_end(longest, 4)} s, since the plant's pole at "
+            f"{fastest:.4g} rad/s in the right half plane amplifies rounding errors (sampled has no such limit)"
         )
 
 

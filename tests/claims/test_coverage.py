@@ -152,7 +152,7 @@ def test_the_record_of_a_text(exceptions: pd.DataFrame):
     [
         ("name,pattern\n", "the columns are name, pattern"),
         (",".join(EXCEPTION_COLUMNS) + "\na,line,x,y\n", "line 2: scope is 'line'"),
-        (",".join(EXCEPTION_COLUMNS) + "\na,text,(,y\n", "line 2: '(' is no regular expression"),
+        (",".join(EXCEPTION_COLUMNS) + "\na,text,(,y\n", "line 2: '(' is not a regular expression"),
         (",".join(EXCEPTION_COLUMNS) + "\nquoted,text,x,y\n", "line 2: an exception is named quoted"),
     ],
 )

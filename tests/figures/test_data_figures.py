@@ -389,7 +389,7 @@ def test_caption_counts_the_lines_above_the_bound(above):
     tables = additive_error_tables()
     tables["additive_error"].loc[: above - 1, "error"] = 1e6
     caption = figure_module("fig_2_09").caption(tables)
-    assert ("at every line" if above == 0 else "but for 2 lines") in caption
+    assert ("at every line" if above == 0 else "except at 2 lines") in caption
     assert "2 of the tests are SYNTHETIC" in caption
     tables["additive_error_summary"]["synthetic_tests"] = 0
     assert "SYNTHETIC" not in figure_module("fig_2_09").caption(tables)

@@ -177,7 +177,7 @@ W_a = 0.3 (1 + s/40) / (1 + 2 0.2 s/60 + (s/60)^2)
 It is 3.25 times the largest of these distances on average and 12.5 times at most; no bound of this order gets
 below 11.7 times
 It touches day_0.csv at 55.5 rad/s
-run last at a limit [s] most asked for [mA]
+run last at a limit [s] largest control [mA]
 without anti-windup 3.12 12.5 0.875 1.5
 anti-windup corrected 3.12 12.5 0.125 1.5
 """

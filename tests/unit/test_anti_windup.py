@@ -249,7 +249,10 @@ def test_an_unstable_plant_pole_is_a_zero_of_one_plus_theta1() -> None:
         ((1.0, 1.0, 100.0), "the sector is 1; expected 0 < sector < 1"),
         ((1.0, float("nan"), 100.0), "the sector is nan; expected 0 < sector < 1"),
         ((1.0, 0.9, float("inf")), "bandwidth of the anti-windup is inf rad/s; expected a finite one"),
-        ((1.0, 0.9, 2.0), "bandwidth of the anti-windup is 2 rad/s; expected a finite one of at least 4.60517 rad/s"),
+        (
+            (1.0, 0.9, 2.0),
+            "bandwidth of the anti-windup is 2 rad/s; expected a finite one of at least 4.60517019 rad/s",
+        ),
     ],
 )
 def test_a_corrected_one_out_of_range_is_refused(

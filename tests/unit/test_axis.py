@@ -119,7 +119,7 @@ def test_what_is_written_is_read_again(tmp_path_factory: pytest.TempPathFactory,
 
 def test_new_writes_a_file_that_says_nothing_yet_and_whose_every_line_may_be_taken(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
-    assert "take the # away" in invoke("new", path)
+    assert "remove the #" in invoke("new", path)
     assert read_axis(path) == {}
     text = path.read_text(encoding="utf-8")
     taken = tomllib.loads("\n".join(re.findall(r"^# ([\w-]+ = .*)$", text, flags=re.MULTILINE)))

@@ -150,7 +150,7 @@ def test_what_is_no_part_of_the_campaign_stays_and_is_named(design: Path, tmp_pa
     foreign.write_text("half", encoding="utf-8")
     result = run(design, 1, output)
     assert result.exit_code == 0
-    assert f"{foreign.parent} stays, since it holds {foreign.name}" in result.stderr
+    assert f"{foreign.parent} is kept, since it holds {foreign.name}" in result.stderr
     assert [path.name for path in foreign.parent.iterdir()] == [foreign.name]
 
 

@@ -139,7 +139,7 @@ def test_a_plant_that_did_not_move_passes(model: IdentifiedModel, design: Design
     )
     assert {each.outcome for each in answers(found)} == {Outcome.HOLDS}
     assert first_sentence(found) == (
-        "Nothing to do: every sweep lies within W_a but for noise, no parameter moved by more than chance, "
+        "Nothing to do: every sweep lies within W_a except for noise, no parameter moved by more than chance, "
         "the design keeps its margins and its guarantee"
     )
 
@@ -324,7 +324,7 @@ def test_few_scattered_tests_do_not_tell_that_nothing_moved(model: IdentifiedMod
     assert 12 * stats.norm.sf(errors) < LEVEL / 2 < 12 * stats.t.sf(errors, 2)
     outcome, sentence = asked(check_model(scattered, [sweep]), "parameters")
     assert outcome is Outcome.OPEN
-    assert re.match(r"3 tests are too few to tell whether a parameter moved: the gain differs by \+\d\d % ", sentence)
+    assert re.match(r"3 tests are too few to show whether a parameter moved: the gain differs by \+\d\d % ", sentence)
     least = np.expm1(stats.t.isf(LEVEL / 24, 2) * 0.03 * np.sqrt(4 / 3))
     told = re.search(r"only a move of (\d+) % or more can be detected", sentence)
     assert told is not None

@@ -269,7 +269,7 @@ def test_simulate_stops_at_until(runner: CliRunner, tmp_path: Path, extended_jso
         ({"--limit": "nan"}, "--limit is nan"),
         ({"--until": "0"}, "--until is 0"),
         ({"--sample-time": "2"}, "sample time <= until"),
-        ({"--until": "inf"}, "both finite"),
+        ({"--until": "inf"}, "until < inf"),
         ({"--gamma": "5", "--anti-windup": "corrected"}, "--gamma belongs to --anti-windup thesis"),
         ({"--alpha": "-1"}, "expected alpha > 0"),
         ({"--amplitude": "nan"}, "expected finite numbers"),

@@ -158,9 +158,9 @@ def test_sampled_without_limits(design_json: Path) -> None:
     [
         (["--rate", "0"], "the rate is 0 Hz"),
         (["--rate", "nan"], "the rate is nan Hz"),
-        (["--rate", "1e12"], "rows are asked for"),
+        (["--rate", "1e12"], "rows; expected at most"),
         (["--until", "nan"], "the run lasts nan s"),
-        (["--until", "inf"], "rows are asked for"),
+        (["--until", "inf"], "rows; expected at most"),
         (["--until", "0.001"], "expected a finite time of one sample"),
         (["--limit", "-1"], "--limit is -1"),
         (["--quantum", "-1"], "the quantum is -1"),

@@ -52,7 +52,7 @@ def read_exceptions(path: Path = EXCEPTIONS) -> pd.DataFrame:
         try:
             re.compile(pattern)
         except re.error as error:
-            raise InputError(f"{path}, line {line}: {shown(pattern)} is no regular expression ({error})") from None
+            raise InputError(f"{path}, line {line}: {shown(pattern)} is not a regular expression ({error})") from None
     return exceptions
 
 
