@@ -124,9 +124,9 @@ def test_new_writes_a_file_that_says_nothing_yet_and_whose_every_line_may_be_tak
     text = path.read_text(encoding="utf-8")
     taken = tomllib.loads("\n".join(re.findall(r"^# ([\w-]+ = .*)$", text, flags=re.MULTILINE)))
     assert list(taken) == list(KEYS)
-    assert "is there already" in invoke("new", path)
+    assert "exists already" in invoke("new", path)
     path.write_text("mine", encoding="utf-8")
-    assert "is there already" in invoke("new", path)
+    assert "exists already" in invoke("new", path)
     assert path.read_text(encoding="utf-8") == "mine"
     invoke("new", path, "--force")
     assert path.read_text(encoding="utf-8") == text
