@@ -26,7 +26,7 @@ def read_json(path: Path, schema: int) -> dict[str, Any]:
         Another schema, or see :func:`read_object`.
     """
     content = read_object(path)
-    if content.get("schema") != schema:
+    if isinstance(content.get("schema"), bool) or content.get("schema") != schema:
         raise InputError(f"{path}: schema is {shown(content.get('schema'))}; expected {schema}")
     return content
 
@@ -109,10 +109,10 @@ def numbers(content: Mapping[str, Any], key: str) -> tuple[float, ...]:
 
 def whole(content: Mapping[str, Any], key: str) -> int:
     """Return the whole number at ``key``; raises InputError when there is none."""
-    value = content.get(key)
-    if isinstance(value, bool) or not isinstance(value, int):
+    value = number(content, key)
+    if not value.is_integer():
         raise InputError(f"{shown(key)} is {shown(value)}; expected a whole number")
-    return value
+    return int(value)
 
 
 def words(content: Mapping[str, Any], key: str) -> str:
@@ -139,6 +139,35 @@ def truth(content: Mapping[str, Any], key: str) -> bool:
     return value
 
 
+def refuse_unread(given: Any, written: Any, path: str = "") -> None:
+    """Refuse a file that says more than its reader took from it.
+
+    Parameters
+    ----------
+    given
+        What the file holds.
+    written
+        What is written of that which was read.
+    path
+        Where both stand, such as ``plant.zero_modes.0.``; empty for the whole file.
+
+    Raises
+    ------
+    InputError
+        An object has a member that is not written, a list has another length, or a value is of another type.
+    """
+    if isinstance(given, dict) and isinstance(written, dict):
+        for name, value in given.items():
+            if name not in written:
+                raise InputError(f"the member {shown(path + name)} is unknown; expected one of {', '.join(written)}")
+            refuse_unread(value, written[name], f"{path}{name}.")
+    elif isinstance(given, list) and isinstance(written, list) and len(given) == len(written):
+        for index, value in enumerate(given):
+            refuse_unread(value, written[index], f"{path}{index}.")
+    elif isinstance(given, list) or _kind(given) is not _kind(written):
+        raise InputError(f"{shown(path[:-1])} is {shown(given)}; expected something like {shown(written)}")
+
+
 def or_none(reader: Reader) -> Reader:
     """The reader of a member that may be null; one that is missing is refused as ``reader`` refuses it."""
     return lambda content, key: None if key in content and content[key] is None else reader(content, key)
@@ -146,6 +175,10 @@ def or_none(reader: Reader) -> Reader:
 
 READERS: dict[str, Reader] = {"float": number, "int": whole, "str": words, "bool": truth}
 READERS |= {f"{name} | None": or_none(reader) for name, reader in READERS.items()}
+
+
+def _kind(value: object) -> type:
+    return float if type(value) is int else type(value)
 
 
 def _object(members: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
 
 from identification.base.errors import InputError
-from identification.base.json_object import member, read_json
+from identification.base.json_object import member, read_json, refuse_unread
 from identification.model.additive_bound import AdditiveBound
 from identification.model.fit_record import FitRecord, Numbers
 from identification.model.plant import PlantModel
@@ -41,7 +39,7 @@ class IdentifiedModel:
         One for each of ``plant.parameters``, in their units; None when the parameters were not estimated (the thesis's
         printed sets).
     fit
-        How the model came about; None where there was no fit, or where an older version wrote less of it.
+        How the model came about; None where there was no fit.
     signals
         Names and units of the plant's input and output.
     """
@@ -91,29 +89,22 @@ def read_model(path: Path | str) -> IdentifiedModel:
     Raises
     ------
     InputError
-        No such file, not JSON, another schema, or a number missing or out of range.
+        No such file, not JSON, another schema, or a member unknown, missing or of the wrong form.
     """
     content = read_json(Path(path), SCHEMA)
     try:
         plant = plant_from_dict(member(content, "plant"))
         bound = bound_from_dict(member(content, "additive_bound"))
-        signals = Signals.from_dict(member(content, "signals")) if "signals" in content else UNNAMED
+        errors = content.get("standard_errors")
+        fit = member(content, "fit") if "fit" in content else {}
+        model = IdentifiedModel(
+            plant,
+            bound,
+            standard_errors=None if errors is None else from_shape(plant, member(content, "standard_errors")),
+            fit=FitRecord.from_dict(fit, plant, bound) if fit else None,
+            signals=Signals.from_dict(member(content, "signals")) if "signals" in content else UNNAMED,
+        )
+        refuse_unread(content, json.loads(model.to_json()))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return IdentifiedModel(plant, bound, _standard_errors(content, plant), _fit(content, plant, bound), signals)
-
-
-def _standard_errors(content: Mapping[str, Any], plant: PlantModel) -> Numbers | None:
-    """None where the file has none that are of the plant's shape: nothing is designed from them."""
-    try:
-        return from_shape(plant, member(content, "standard_errors"))
-    except InputError:
-        return None
-
-
-def _fit(content: Mapping[str, Any], plant: PlantModel, bound: AdditiveBound) -> FitRecord | None:
-    """None where the file does not say all of it: nothing is designed from it."""
-    try:
-        return FitRecord.from_dict(member(content, "fit"), plant, bound)
-    except InputError:
-        return None
+    return model
