@@ -17,7 +17,7 @@ from design.blocks.inner_outer import inner_outer
 from design.hinf.mixed_sensitivity import Synthesis
 from design.parameters import DelayFreeParameters, ExtendedParameters
 from identification.base.errors import InputError, shown
-from identification.base.json_object import member, number, read_json, refuse_unread, texts
+from identification.base.json_object import member, number, read_json, require_known, texts
 from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
 from identification.model.plant_json import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
@@ -145,9 +145,9 @@ class Design:
             return self.blocks["K"] * plant_denominator(self.plant) * self.blocks["Lambda"].inverse(), Block(0.0)
         return self.blocks["K"], self.blocks["T_so"] * inner_outer(self.plant)[0].without_delay()
 
-    def to_json(self) -> str:
-        """The text of design.json; every number is finite or this raises ValueError."""
-        content = {
+    def to_dict(self) -> dict[str, Any]:
+        """The object of design.json."""
+        return {
             "schema": SCHEMA,
             "kind": self.kind,
             "signals": self.signals.to_dict(),
@@ -160,7 +160,10 @@ class Design:
             "anti_windup": {name: each.to_dict() for name, each in self.anti_windup.items()},
             "compared": list(self.compared),
         }
-        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+    def to_json(self) -> str:
+        """The text of design.json; every number is finite or this raises ValueError."""
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
 
 
 def read_design(path: Path | str, kind: str | None = None) -> Design:
@@ -176,7 +179,7 @@ def read_design(path: Path | str, kind: str | None = None) -> Design:
     Raises
     ------
     InputError
-        No such file, not JSON, another schema or kind, or a member unknown, missing or of the wrong form.
+        No such file, not JSON, another schema or kind, or a member missing, not known or of the wrong form.
     """
     content = read_json(Path(path), SCHEMA)
     try:
@@ -214,7 +217,7 @@ def read_design(path: Path | str, kind: str | None = None) -> Design:
         for name, value in (("bandwidth", corrected.bandwidth), ("recovery_s", corrected.judgement.recovery_s)):
             if not 1e-100 < value < 1e100:
                 raise InputError(f"'{name}' of the corrected anti-windup is not a positive number")
-        refuse_unread(content, json.loads(design.to_json()))
+        require_known(content, design.to_dict())
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return design

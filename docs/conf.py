@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import sys
 import warnings
 from importlib.metadata import metadata
+from itertools import pairwise
 from pathlib import Path
 from types import GenericAlias
 from typing import TYPE_CHECKING, Any
@@ -65,7 +67,6 @@ nb_merge_streams = True
 # docstrings
 add_module_names = False
 autodoc_typehints = "none"
-autodoc_default_options = {"members": True, "show-inheritance": False}
 viewcode_follow_imported_members = False  # else the way back from the source of a room's face is lost
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
@@ -148,8 +149,21 @@ def write_api_pages(app: Sphinx) -> None:
             for module in modules:
                 if module != package:
                     lines += [module.rpartition(".")[2], "-" * len(module), ""]
-                lines += [f".. automodule:: {module}", ""]
+                lines += [f".. automodule:: {module}", f"   :members: {_documented(folder, module)}", ""]
             (API / f"{package}.rst").write_text("\n".join(lines), encoding="utf-8")
+
+
+def _documented(folder: Path, module: str) -> str:
+    """What a module itself documents: autodoc would load all that it imports, too; a package's face may show all."""
+    if not (source := folder / f"{module.rpartition('.')[2]}.py").exists():
+        return ""
+    body = ast.parse(source.read_text(encoding="utf-8")).body
+    names = [each.name for each in body if isinstance(each, ast.FunctionDef | ast.ClassDef)]
+    for assigned, said in pairwise(body):
+        if isinstance(said, ast.Expr) and isinstance(assigned, ast.Assign | ast.AnnAssign):
+            targets = assigned.targets if isinstance(assigned, ast.Assign) else [assigned.target]
+            names += [each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)]
+    return ", ".join(name for name in names if not name.startswith("_"))
 
 
 def write_command_pages(app: Sphinx) -> None:

@@ -230,7 +230,8 @@ def driven(flow: np.ndarray, inputs: np.ndarray, first: np.ndarray) -> np.ndarra
     """x_0 = ``first``, x_{k+1} = flow x_k + inputs_k, shape (count + 1, n), for ``inputs`` of the shape (count, n)."""
     count, n = inputs.shape
     x = np.empty((count + 1, n))
-    x[0] = first
+    for i in range(n):
+        x[0, i] = first[i]
     for k in range(count):
         for i in range(n):
             total = inputs[k, i]

@@ -201,7 +201,7 @@ def compare(design: Path, limit: float | None, output: Path) -> None:
 @LIMIT
 @OUTPUT_FOLDER
 def hidden_modes(design: Path, limit: float | None, output: Path) -> None:
-    """Run the loop of chapter 4 for an hour with rounded states: hidden_modes.csv, hidden_modes_summary.csv."""
+    """Run the loop of chapter 4 for 15 minutes with rounded states: hidden_modes.csv, hidden_modes_summary.csv."""
     from tqdm import tqdm
 
     from design.design_file import read_design

@@ -26,8 +26,9 @@ def read_json(path: Path, schema: int) -> dict[str, Any]:
         Another schema, or see :func:`read_object`.
     """
     content = read_object(path)
-    if isinstance(content.get("schema"), bool) or content.get("schema") != schema:
-        raise InputError(f"{path}: schema is {shown(content.get('schema'))}; expected {schema}")
+    found = content.get("schema")
+    if isinstance(found, bool) or found != schema:
+        raise InputError(f"{path}: schema is {shown(found)}; expected {schema}")
     return content
 
 
@@ -89,6 +90,36 @@ def objects(content: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
     return values
 
 
+def require_known(content: Any, known: Any, place: str = "") -> None:
+    """Require that a reader took all of a JSON document: a misspelt member that may be left out would not be missed.
+
+    Parameters
+    ----------
+    content
+        The document.
+    known
+        What the program writes of it after it was read.
+    place
+        Where in a file it stands.
+
+    Raises
+    ------
+    InputError
+        A member is not known, a list has another length, or a value is of another type.
+    """
+    where = place or "the file"
+    if isinstance(content, dict) and isinstance(known, Mapping):
+        for key, value in content.items():
+            if key not in known:
+                raise InputError(f"{where} has the member {shown(key)}; expected one of {', '.join(known)}")
+            require_known(value, known[key], shown(key))
+    elif isinstance(content, list) and isinstance(known, list | tuple) and len(content) == len(known):
+        for own, other in zip(content, known, strict=True):
+            require_known(own, other, place)
+    elif isinstance(content, list) or _kind(content) is not _kind(known):
+        raise InputError(f"{where} is {shown(content)}; expected the form of {shown(known)}")
+
+
 def number(content: Mapping[str, Any], key: str) -> float:
     """Return the number at ``key``; raises InputError when there is none."""
     value = content.get(key)
@@ -137,35 +168,6 @@ def truth(content: Mapping[str, Any], key: str) -> bool:
     if not isinstance(value, bool):
         raise InputError(f"{shown(key)} is {shown(value)}; expected true or false")
     return value
-
-
-def refuse_unread(given: Any, written: Any, path: str = "") -> None:
-    """Refuse a file that says more than its reader took from it.
-
-    Parameters
-    ----------
-    given
-        What the file holds.
-    written
-        What is written of that which was read.
-    path
-        Where both stand, such as ``plant.zero_modes.0.``; empty for the whole file.
-
-    Raises
-    ------
-    InputError
-        An object has a member that is not written, a list has another length, or a value is of another type.
-    """
-    if isinstance(given, dict) and isinstance(written, dict):
-        for name, value in given.items():
-            if name not in written:
-                raise InputError(f"the member {shown(path + name)} is unknown; expected one of {', '.join(written)}")
-            refuse_unread(value, written[name], f"{path}{name}.")
-    elif isinstance(given, list) and isinstance(written, list) and len(given) == len(written):
-        for index, value in enumerate(given):
-            refuse_unread(value, written[index], f"{path}{index}.")
-    elif isinstance(given, list) or _kind(given) is not _kind(written):
-        raise InputError(f"{shown(path[:-1])} is {shown(given)}; expected something like {shown(written)}")
 
 
 def or_none(reader: Reader) -> Reader:

@@ -389,13 +389,14 @@ def test_a_model_without_a_fit_is_compared_with_its_bound_alone(
 
 
 @pytest.mark.parametrize("change", [{"tests": []}, {"band": [0.0, 9.0]}, {"band": [9.0]}])
-def test_a_fit_that_does_not_say_where_it_was_made_is_none(
+def test_a_fit_that_does_not_say_where_it_was_made_is_refused(
     bench: Path, tmp_path: Path, change: dict[str, list[float]]
 ) -> None:
     content = json.loads((bench / "model.json").read_text(encoding="utf-8"))
     content["fit"] |= {"tests": [each | change for each in content["fit"]["tests"]]} | change
     (tmp_path / "model.json").write_text(json.dumps(content), encoding="utf-8")
-    assert read_model(tmp_path / "model.json").fit is None
+    with pytest.raises(InputError, match=f"'{next(iter(change))}' is .*of 'fit', which may be left out"):
+        read_model(tmp_path / "model.json")
 
 
 @pytest.mark.parametrize(

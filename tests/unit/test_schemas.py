@@ -31,7 +31,6 @@ MODEL, DESIGN = (
 )
 OTHER_TYPES = (None, "text", 7.5, True, {})
 ABSURD = (1e300, -1e300, 1e-300)
-DERIVED = "said"  # what the writer makes of its neighbours and no reader reads
 
 Content = dict[str, Any]
 Read = Callable[[Path], IdentifiedModel | Design]
@@ -69,15 +68,7 @@ def documents(fitted: IdentifiedModel) -> dict[str, Content]:
     for name in ("extended", "delay-free"):  # some blocks are enough
         blocks = contents[name]["blocks"]
         contents[name]["blocks"] = {each: blocks[each] for each in ("K", "T_so", "Lambda", "G_A") if each in blocks}
-    return {name: without_derived(content) for name, content in contents.items()}
-
-
-def without_derived(content: Any) -> Any:
-    if isinstance(content, list):
-        return [without_derived(each) for each in content]
-    if not isinstance(content, dict):
-        return content
-    return {key: without_derived(value) for key, value in content.items() if key != DERIVED}
+    return contents
 
 
 def objects_of(content: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:

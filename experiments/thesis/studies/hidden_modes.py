@@ -19,8 +19,8 @@ from experiments.thesis.studies.chapter_4 import usual_limit
 from identification.base.errors import InputError
 
 # Our choices, in units of the design: the thesis has no computer.
-PERIODS = 860  # of the reference: an hour of the thesis's
-MOST_SAMPLES = 4_000_000  # beyond which the run has fewer periods
+PERIODS = 215  # of the reference: a quarter of an hour of the thesis's
+MOST_SAMPLES = 1_000_000  # beyond which the run has fewer periods
 SAMPLES = 2 + 2 * math.sqrt(5)  # in a period of the fastest root of the controller
 BITS = 16  # of the computer's numbers: 2^BITS steps from limit to limit
 FIRST = 0.1  # of a period, before which nothing has grown that can be seen
