@@ -31,6 +31,8 @@ ROOT = Path(__file__).resolve().parents[1]
 API = ROOT / "docs" / "reference" / "api"
 COMMANDS = ROOT / "docs" / "reference" / "commands"
 ROOMS = ("identification", "design", "experiments", "paper_figures", "antiwindup")
+WIDE = 35
+"""A table whose columns together take more characters is too wide for a narrow screen."""
 LITERAL = re.compile(r"(``.+?``)")
 sys.path.insert(0, str(ROOT))  # data.thesis
 
@@ -84,6 +86,8 @@ html_theme_options = {
     "navigation_with_keys": False,
     "footer_start": ["copyright"],
     "footer_end": [],
+    # their tables take the place of the list of sections
+    "secondary_sidebar_items": {"**": ["page-toc"], "thesis/claims": [], "thesis/equations": []},
 }
 linkcheck_timeout = 20
 
@@ -95,6 +99,20 @@ def mathml(translator: HTML5Translator, node: nodes.Element) -> None:
     display = "inline" if node.tagname == "math" else "block"
     translator.body.append(convert(node.astext(), display=display))
     raise SkipNode
+
+
+def name_cells(app: Sphinx, document: nodes.document, page: str) -> None:
+    """Mark the wide tables; name the column in each of their cells, which a narrow screen shows."""
+    from docutils import nodes
+
+    for table in document.findall(nodes.table):
+        heads, rows = (next(table.findall(kind), []) for kind in (nodes.thead, nodes.tbody))
+        if heads and sum(max(len(cell.astext()) for cell in column) for column in zip(*rows, strict=True)) > WIDE:
+            table["classes"].append("wide")
+            for row in rows:
+                for head, cell in zip(heads[0], row, strict=False):
+                    if cell.children and head.astext():
+                        cell[0].insert(0, nodes.inline("", f"{head.astext()}: ", classes=["column"]))
 
 
 def without_substitutions(*arguments: Any) -> None:
@@ -199,6 +217,7 @@ def setup(app: Sphinx) -> None:
     app.connect("sphinx-click-process-options", whole_metavars)
     app.connect("autodoc-skip-member", of_others)
     app.connect("doctree-resolved", link_to_source)
+    app.connect("doctree-resolved", name_cells)
     app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
 
 

@@ -21,6 +21,9 @@ from identification.model.python_control import from_control, to_control
 if TYPE_CHECKING:
     from control import TransferFunction
 
+LARGEST_ROOT = 1e30
+"""rad/s: no part of a root that is read from a file may be larger; products of larger ones overflow."""
+
 
 @dataclass(frozen=True)
 class Block:
@@ -144,7 +147,10 @@ def _listed(content: Mapping[str, Any], key: str) -> tuple[complex, ...]:
     """The roots at ``key``, a list of pairs of numbers."""
     if not isinstance(content[key], list):
         raise InputError(f"{key} is {shown(content[key])}; expected a list of pairs of numbers")
-    return tuple(complex(real, imag) for real, imag in (numbers({key: root}, key) for root in content[key]))
+    roots = tuple(complex(real, imag) for real, imag in (numbers({key: root}, key) for root in content[key]))
+    if any(max(abs(root.real), abs(root.imag)) > LARGEST_ROOT for root in roots):
+        raise InputError(f"{key} is {shown(content[key])}; expected numbers of at most {LARGEST_ROOT:g} rad/s")
+    return roots
 
 
 def mode_product(gain: float, modes: Iterable[Mode], rates: Iterable[float] = ()) -> Block:

@@ -59,7 +59,7 @@ def test_json_there_and_back() -> None:
     ("change", "sentence"),
     [
         ({"integrators": 3}, "integrators is 3; expected an integer from -2 to 2"),
-        ({"integrators": True}, "integrators is True"),
+        ({"integrators": True}, "'integrators' is True"),
         ({"real_zeros": 3.0}, "'real_zeros' is 3.0; expected a list of numbers"),
         ({"real_poles": [0.0]}, "real_poles is 0; expected any other number"),
         ({"real_poles": ["2"]}, "'real_poles' is '2'; expected a number"),
