@@ -260,7 +260,7 @@ def test_slow_and_fast_plants(implied: IdentifiedModel, scale: float) -> None:
         (lambda content: content["blocks"].pop("T_so"), "'T_so' is missing"),
         (lambda content: content["blocks"]["T_so"].update(zeros={}), "expected a list of pairs of numbers"),
         (lambda content: content["plant"].update(gain=14.0), "do not belong to the plant"),
-        (lambda content: content["plant"].update(integrators=2), "so that the controller is improper"),
+        (lambda content: content["plant"].update(integrators=2), "so the controller is improper"),
         (lambda content: content["anti_windup"]["corrected"].update(bandwidth=-5.0), "not a positive number"),
         (lambda content: content["anti_windup"]["corrected"].update(bandwidth="x"), "expected a number"),
         (lambda content: content.update(hinf={"gamma": 1.0}), "gamma_lower"),

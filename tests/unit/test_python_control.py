@@ -99,7 +99,7 @@ def test_a_response_goes_there_and_back() -> None:
         (OMEGA[::-1], test.response, "increasing"),
         (OMEGA, test.response[:3], "shapes"),
         (OMEGA, np.nan * test.response, "not finite"),
-        ([], [], "one at least"),
+        ([], [], "equal lengths of at least 1"),
     ):
         with pytest.raises(InputError, match=said):
             FrequencyResponse(omega, response, None, "mine")
