@@ -37,8 +37,8 @@ FULL = 0.9
 STRAIGHT, TURN = 0.12, 10.0
 """Two pieces of a line longer than this share of the panel that turn by more degrees make a polygon."""
 PASSES, BESIDE, SWING = 6.0, 5.0, 0.06
-"""A line that goes so many times up or down its range in so many points of the page is a smear; a range of a smaller share
-of the panel only makes it look broader."""
+"""A line that goes so many times up or down its range in so many points of the page is a smear; a range of a smaller
+share of the panel only makes it look broader."""
 NARROW = 5.0
 """Pixels: a narrower peak is one."""
 TOUCHING = 1.0
