@@ -123,7 +123,7 @@ class Design:
             from design.anti_windup.other_anti_windups import OTHERS  # only here: nothing else needs them
 
             if asked not in OTHERS:
-                known = f"the design has {', '.join(self.anti_windup)}; of others there are {', '.join(OTHERS)}"
+                known = f"expected {', '.join(self.anti_windup)} of the design, or {', '.join(OTHERS)}"
                 raise InputError(f"there is no anti-windup '{asked}'; {known}")
             return OTHERS[asked](self.linear_loop)
         return asked.kind if isinstance(asked, Compensator) else asked
@@ -206,7 +206,10 @@ def read_design(path: Path | str, kind: str | None = None) -> Design:
             signals=Signals.from_dict(member(content, "signals")) if "signals" in content else UNNAMED,
         )
         if (hinf is not None) != delay_free:
-            raise InputError(f"hinf belongs to a delay-free design and to no other; kind is '{design.kind}'")
+            raise InputError(
+                f"kind is '{design.kind}' {'without' if delay_free else 'with'} hinf; expected hinf in a delay-free "
+                "design alone"
+            )
         needed = ("K", "Lambda", "G_A") if delay_free else ("K", "T_so")
         for name in needed:
             if name not in design.blocks:

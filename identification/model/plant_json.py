@@ -44,8 +44,8 @@ def from_shape(plant: PlantModel, content: Mapping[str, Any]) -> tuple[float, ..
     counts = [len(of) for of in (plant.zero_modes, plant.pole_modes, plant.real_zeros, plant.real_poles)]
     modes = [_pairs(content, key) for key in ("zero_modes", "pole_modes")]
     rates = [_rates(content, key) for key in ("real_zeros", "real_poles")]
-    if [len(of) for of in (*modes, *rates)] != counts:
-        raise InputError("there are other numbers of modes and real roots than the plant has; expected as many")
+    if (counted := [len(of) for of in (*modes, *rates)]) != counts:
+        raise InputError(f"the numbers of modes and real roots are {counted}; expected {counts}, as of the plant")
     middle = (*(value for of in modes for pair in of for value in pair), *(rate for of in rates for rate in of))
     return (number(content, "gain"), *middle, number(content, "delay_s"))
 

@@ -110,7 +110,7 @@ def test_what_the_stabiliser_reaches_is_not_taken_from_the_file(delay_free_desig
         assert getattr(found.stabiliser, name) == getattr(hinf, name)
     slower = audit(dataclasses.replace(delay_free_design, blocks={**delay_free_design.blocks, "K": K.scaled(0.01)}))
     assert isinstance(slower.stabiliser, str)
-    assert "with K a closed-loop pole lies at Re s = " in slower.stabiliser
+    assert "K gives a closed-loop pole with Re s = " in slower.stabiliser
 
 
 def test_a_dead_time_that_the_design_ignored_may_be_fatal(implied: IdentifiedModel) -> None:
@@ -161,7 +161,7 @@ def test_what_is_printed_of_chapter_two(delay_free_design: Design, tmp_path: Pat
     for part in (
         "on the plant with its dead time of 8.1 ms",
         "infimum of (2.8)",
-        "no stable T meets its 14 conditions",
+        "no stable T meets the 14 interpolation conditions",
         "cancelled",
     ):
         assert part in said

@@ -346,7 +346,7 @@ def test_a_manifest_that_leads_out_of_the_folder_is_refused(refit: Refit, tmp_pa
     (tmp_path / "mine").mkdir()
     listed = {"schema": 1, "files": {name: {"source": "", "content": None}}}
     (tmp_path / "mine" / "manifest.json").write_text(json.dumps(listed), encoding="utf-8")
-    with pytest.raises(InputError, match=r"manifest\.json: '.*' leads out of the folder"):
+    with pytest.raises(InputError, match=r"manifest\.json: '.*' lies outside the folder"):
         refit()
     assert (tmp_path / "outside.txt").read_text(encoding="utf-8") == "mine"
 
@@ -530,7 +530,7 @@ SWEEP = Path(__file__).resolve().parents[2] / "data" / "elevation" / "synthetic_
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (["refit", str(SWEEP), "--output", ""], "--output is ''; expected a folder for the outputs alone"),
+        (["refit", str(SWEEP), "--output", ""], "--output is ''; expected a folder that holds nothing but the outputs"),
         (["refit", str(SWEEP), "--output", "/"], "--output is '/'; expected a folder"),
         (["refit", str(SWEEP), "--output", "root"], "--output is 'root'; expected a folder"),  # a link to /
         (["refit", str(SWEEP), "--output", "a\nb"], r"'a\nb': holds a line break"),

@@ -72,7 +72,7 @@ def hidden_modes_tables(
     if limit is None:
         limit = usual_limit(design)
     if not math.isfinite(limit):
-        raise InputError(f"the limit is {limit:g}; expected a finite one, whose range the computer's numbers divide")
+        raise InputError(f"the limit is {limit:g}; expected a finite one, whose range fixes the resolution")
     rate_hz = SAMPLES * fastest_root(*design.controller_parts()) / (2 * math.pi)
     period_s = span(design, reference)
     duration_s = min(PERIODS * period_s, MOST_SAMPLES / rate_hz)
