@@ -111,7 +111,7 @@ def name_cells(app: Sphinx, document: nodes.document, page: str) -> None:
             table["classes"].append("wide")
             for row in rows:
                 for head, cell in zip(heads[0], row, strict=False):
-                    if cell.children and head.astext():
+                    if cell.astext() and head.astext():
                         cell[0].insert(0, nodes.inline("", f"{head.astext()}: ", classes=["column"]))
 
 

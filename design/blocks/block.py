@@ -87,7 +87,9 @@ class Block:
         return Block(self.gain, zeros, poles)
 
     def inverse(self) -> Block:
-        """1/block; raises InputError when it has a dead time, whose inverse is not causal."""
+        """1/block; raises InputError when it is 0, or has a dead time, whose inverse is not causal."""
+        if self.gain == 0:
+            raise InputError("a block's gain is 0; expected any other number, for it is inverted")
         return Block(1 / self.gain, self.poles, self.zeros, -self.delay_s)
 
     def without_delay(self) -> Block:

@@ -69,7 +69,7 @@ def plant_from_dict(content: Mapping[str, Any]) -> PlantModel:
         gain=number(content, "gain"),
         zero_modes=_modes(content, "zero_modes"),
         pole_modes=_modes(content, "pole_modes"),
-        delay_s=_sized("delay_s", number(content, "delay_s"), least=0.0),
+        delay_s=sized("delay_s", number(content, "delay_s"), least=0.0),
         integrators=whole(content, "integrators") if "integrators" in content else 1,
         real_zeros=_sized_rates(content, "real_zeros"),
         real_poles=_sized_rates(content, "real_poles"),
@@ -92,7 +92,7 @@ def bound_to_dict(bound: AdditiveBound) -> dict[str, Any]:
 def bound_from_dict(content: Mapping[str, Any]) -> AdditiveBound:
     """Read what :func:`bound_to_dict` writes; raises InputError as :func:`plant_from_dict` does."""
     if "pole_modes" not in content:
-        rates = (_sized(key, number(content, key)) for key in ("corner", "omega", "zeta"))
+        rates = (sized(key, number(content, key)) for key in ("corner", "omega", "zeta"))
         return AdditiveBound.printed_form(number(content, "gain"), *rates)
     return AdditiveBound(
         gain=number(content, "gain"),
@@ -104,11 +104,11 @@ def bound_from_dict(content: Mapping[str, Any]) -> AdditiveBound:
 
 
 def _modes(content: Mapping[str, Any], key: str) -> tuple[Mode, ...]:
-    return tuple(Mode(_sized("omega", omega), _sized("zeta", zeta)) for omega, zeta in _pairs(content, key))
+    return tuple(Mode(sized("omega", omega), sized("zeta", zeta)) for omega, zeta in _pairs(content, key))
 
 
-def _sized(name: str, value: float, least: float = SLOWEST) -> float:
-    """The value; raises InputError when its magnitude is neither 0 nor between the limits."""
+def sized(name: str, value: float, least: float = SLOWEST) -> float:
+    """The value; raises InputError when its magnitude is not 0 and not between ``least`` and :data:`FASTEST`."""
     if value and not least <= abs(value) <= FASTEST:
         raise InputError(f"{shown(name)} is {value:g}; expected a magnitude from {least:g} to {FASTEST:g}")
     return value
@@ -128,4 +128,4 @@ def _rates(content: Mapping[str, Any], key: str) -> tuple[float, ...]:
 
 
 def _sized_rates(content: Mapping[str, Any], key: str) -> tuple[float, ...]:
-    return tuple(_sized(key, rate) for rate in _rates(content, key))
+    return tuple(sized(key, rate) for rate in _rates(content, key))
