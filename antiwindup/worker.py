@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import multiprocessing
 import os
 import sys
@@ -17,7 +16,6 @@ from identification.base.errors import InputError
 from identification.base.files import keep_journal
 from identification.base.process import begin, leave_signals_to_parent, own_surroundings, undisturbed
 
-SELDOM = 200_000  # objects between two searches for cycles of them: a drawing ends before most of its own are worth one
 _server = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else None
 _is_loading = False
 
@@ -78,7 +76,6 @@ def _run(command: Sequence[str], log: str, journal: Path) -> None:
     leave_signals_to_parent()
     begin()
     keep_journal(journal)
-    gc.set_threshold(SELDOM)
     from antiwindup.__main__ import main
 
     sys.argv = ["antiwindup", *command]

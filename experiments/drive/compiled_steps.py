@@ -14,6 +14,7 @@ from identification.base.compiled import njit
 MOST = 1e100  # times the limits, or without limits of a state: beyond it a loop diverges
 ENORMOUS = 1e250  # a state with which no run goes on, whatever the limits
 NEGLIGIBLE = 1e-17  # of the last term of a series, relative to the largest state
+SMALLEST = float(np.finfo(float).tiny)  # with numbers below it a processor computes many times slower
 
 
 class Series(NamedTuple):
@@ -82,13 +83,16 @@ def _row(A: Array, i: int, x: Array) -> float:
 
 @njit(nogil=True)
 def _step(A: Array, b: Array, x: Array, following: Array, given: float, most: float) -> bool:
-    """Replace x by A x + b given; whether all of it stays below ``most``. ``following`` is room for it."""
+    """Replace x by A x + b given; whether all of it stays below ``most``. ``following`` is room for it.
+
+    A state that has decayed below :data:`SMALLEST` becomes 0.
+    """
     small = True
     for i in range(len(x)):
         following[i] = _row(A, i, x) + b[i] * given
         small = small and abs(following[i]) < most
     for i in range(len(x)):
-        x[i] = following[i]
+        x[i] = 0.0 if abs(following[i]) < SMALLEST else following[i]
     return small
 
 

@@ -18,6 +18,7 @@ from design.blocks.block import Block, plant_block
 from design.blocks.state_space import realize
 from design.chapters_3_4.design_extended import design_extended
 from design.design_file import Design
+from experiments.drive.compiled_steps import _step
 from experiments.drive.difference_equations import METHODS, sample_block
 from experiments.drive.sampled_loop import Drive, SampledRun, simulate_sampled
 from experiments.engine.simulate import DivergenceError, simulate
@@ -449,3 +450,15 @@ def test_a_dead_time_beyond_all_bounds(extended_design: Design) -> None:
     run = simulate_sampled(extended_design, sinusoid(50.0, 1.5, 0.0, 0.0), None, drive, 0.1)
     assert not run.output.any()
     assert not run.saturated_control.any()
+
+
+def test_a_state_decays_to_zero_past_the_smallest_normal_number() -> None:
+    """Below it numbers keep fewer digits and cost a processor many times as much: a run of an hour would crawl."""
+    A, x, following = np.array([[0.9, 0.05], [-0.05, 0.9]]), np.array([1.0, -2.0]), np.empty(2)
+    met = np.empty((8000, 2))
+    for k in range(len(met)):
+        assert _step(A, np.zeros(2), x, following, 0.0, math.inf)
+        met[k] = x
+    assert np.all((met == 0) | (np.abs(met) >= np.finfo(float).tiny))
+    assert np.any(np.abs(met) < 1e-300)
+    assert not met[-1].any()
