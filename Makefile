@@ -86,7 +86,7 @@ lint: $(READY) ## check style and types
 	.venv/bin/ruff format --quiet --check .
 	.venv/bin/mypy
 	.venv/bin/lint-imports --no-cache --no-logo
-release-check: $(READY) ## say whether this commit can be released: tree, versions, lint, suite, docs, links, wheel
+release-check: $(READY) ## say whether this commit can be released: tree, versions, lint, suite, docs, wheel, links
 	@echo '1 of 7: the tree is clean'
 	@test -z "$$(git status --porcelain)" || { git status --short; exit 1; }
 	@echo '2 of 7: version, changelog and citation agree'
@@ -97,16 +97,20 @@ release-check: $(READY) ## say whether this commit can be released: tree, versio
 	@$(MAKE) --no-print-directory suite
 	@echo '5 of 7: the documentation builds without a warning'
 	@$(MAKE) --no-print-directory docs
-	@echo '6 of 7: the links to other sites (needs the network)'
-	@$(PY) -m sphinx --quiet -b linkcheck -d build/docs/doctrees docs build/docs/links
-	@echo '7 of 7: the wheel builds, and works in a new environment (needs the network)'
+	@echo '6 of 7: the wheel builds, and works in a new environment (needs a package index)'
 	@rm -rf build/release
 	@$(PY) -m pip wheel --quiet --no-deps --no-build-isolation --no-index --wheel-dir build/release .
 	@$(PYTHON) -m venv build/release/environment
 	@build/release/environment/bin/python -m pip install --quiet --require-hashes --requirement requirements.lock
 	@build/release/environment/bin/python -m pip install --quiet --no-deps --no-index build/release/*.whl
-	@cd build/release && environment/bin/antiwindup --version
+	@said=$$(cd build/release && environment/bin/antiwindup --version); \
+	wanted="antiwindup, version $$(sed -n 's/^version = "\(.*\)"$$/\1/p' pyproject.toml)"; \
+	test "$$said" = "$$wanted" || { echo "the wheel says: $$said; expected: $$wanted"; exit 1; }
 	@cd build/release && environment/bin/antiwindup design extended implied --reference-hz 0.25 --output design.json
+	@echo '7 of 7: the links to other sites work (needs the network)'
+	@$(PY) -c 'from urllib.request import urlopen; urlopen("https://semver.org", timeout=20)' 2>/dev/null || \
+	{ echo 'the links were not checked: https://semver.org does not answer, and this step needs the network'; exit 1; }
+	@$(PY) -m sphinx --quiet -b linkcheck -d build/docs/doctrees docs build/docs/links
 clean: ## remove what was built, but for .venv
 	rm -rf build
 

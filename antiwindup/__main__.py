@@ -38,7 +38,7 @@ class Rooms(CommandGroup):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         own = {name: self.get_command(ctx, name) for name in COMMANDS}
         with formatter.section("From the bench to the drive"):
-            formatter.write_dl([(name, each.get_short_help_str(90)) for name, each in own.items() if each])
+            formatter.write_dl([(name, each.get_short_help_str()) for name, each in own.items() if each])
         with formatter.section("Step by step"):
             formatter.write_dl([(room, str(import_module(room).__doc__).splitlines()[0]) for room in ROOMS])
 

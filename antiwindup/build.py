@@ -210,12 +210,10 @@ class Build:
             if is_refusal:
                 raise InputError(sentence)
             if ended.process.exitcode == LOST:
-                lost = f"{step.name}: was ended with the process that it was forked from"
-                raise InputError(f"{lost}; the same command goes on from what is done")
+                lost = f"{step.name}: was ended because its parent process ended"
+                raise InputError(f"{lost}; the same command continues from there")
             if (status := ended.process.exitcode or 0) < 0:
-                raise InputError(
-                    f"{step.name}: was ended by signal {-status}; the same command goes on from what is done"
-                )
+                raise InputError(f"{step.name}: was ended by signal {-status}; the same command continues from there")
             raise Crash(f"{step.name} ended with status {ended.process.exitcode}:\n{said}")
         self._remove([step])
         self.refused[step.name] = sentence

@@ -33,10 +33,11 @@ def check(
     markdown: Path | None,
     **reading: Any,
 ) -> None:
-    """Check whether new SWEEP files lie within the bound W_a of MODEL, and which parameters have moved.
+    """Check new SWEEP files against MODEL.
 
-    MODEL is a model.json, table or implied. The exit status is 0 if everything holds; 1 if a sweep leaves W_a, a
-    parameter has moved or the design has lost a margin or its guarantee; 2 if the input is refused.
+    The command says whether they lie within the bound W_a of MODEL, and which parameters have moved. MODEL is a
+    model.json, table or implied. The exit status is 0 if everything holds; 1 if a sweep leaves W_a, a parameter has
+    moved or the design has lost a margin or its guarantee; 2 if the input is refused.
     """
     from design.asked_model import asked_model
     from design.design_file import read_design

@@ -60,7 +60,9 @@ build_options = together(
 @signal_options
 @build_options
 def refit(sweeps: tuple[str, ...], **options: Any) -> None:
-    """Fit SWEEP files, design a controller for your axis, simulate it, draw the results and sum them up.
+    """Go from SWEEP files to a tested design.
+
+    The command fits the files, designs a controller for your axis, simulates it, draws the results and sums them up.
 
     Write what you know of the axis into the file of --axis, which `antiwindup new` makes, or give options of the same
     names. Without a reference the command chooses one that the plant can follow with 80 % of the limits.
@@ -93,7 +95,10 @@ def refit(sweeps: tuple[str, ...], **options: Any) -> None:
 @LIMIT
 @build_options
 def figures(sweeps: tuple[str, ...], model: str | None, only: tuple[str, ...], **options: Any) -> None:
-    """Draw the thesis's figures and our own (A.1 to A.9) from SWEEP files."""
+    """Draw all figures from SWEEP files.
+
+    They are the figures of the thesis and our own, A.1 to A.9.
+    """
     from antiwindup.thesis_steps import report_steps, thesis_steps
 
     asked, how = _asked(sweeps, model, **options)
@@ -111,7 +116,10 @@ def figures(sweeps: tuple[str, ...], model: str | None, only: tuple[str, ...], *
 @LIMIT
 @build_options
 def report(sweeps: tuple[str, ...], model: str | None, **options: Any) -> None:
-    """Write one HTML page: the figures with their data, every verdict on the thesis, the fit and the audits."""
+    """Write one HTML page on the thesis.
+
+    It has the figures with their data, every verdict on the thesis, the fit and the audits.
+    """
     from antiwindup.thesis_steps import report_steps, thesis_steps
 
     asked, how = _asked(sweeps, model, **options)
@@ -135,7 +143,7 @@ def _asked(
     from identification.sweeps.input_files import input_files
 
     if not output or true_path(Path(output)) == Path(true_path(Path(output)).anchor):
-        raise InputError(f"--output is {shown(output)}; expected a folder for the outputs alone")
+        raise InputError(f"--output is {shown(output)}; expected a folder that holds nothing but the outputs")
     if limit is not None and not 0 < limit < inf:
         raise InputError(f"--limit is {limit:g}; expected a positive number")
     for name in (*sweeps, *([model] if model else ()), output):

@@ -41,12 +41,13 @@ def explore(
     no_browser: bool,
     output: Path | None,
 ) -> None:
-    """Open a local page with sliders for DESIGN: run, Nyquist plot, step response, audit.
+    """Open a local page with sliders for DESIGN.
 
-    The page redraws the curves while you drag a slider, and the audit once the slider rests. Only this machine can
-    open it, and Ctrl-C ends it. Its address holds the positions of the sliders: a copy of the address opens the same
-    page as long as the command runs. "save" writes the design that is shown as design.json. Without an amplitude the
-    page begins with sinusoids of amplitude 1 at their crests.
+    The page shows a run, the Nyquist plot, the step response and the audit. It redraws the curves while you drag a
+    slider, and the audit once the slider rests. Only this machine can open it, and Ctrl-C ends it. Its address holds
+    the positions of the sliders: a copy of the address opens the same page as long as the command runs. "save" writes
+    the design that is shown as design.json. Without an amplitude the page begins with sinusoids of amplitude 1 at
+    their crests.
     """
     import webbrowser
 

@@ -48,9 +48,10 @@ def export(
     name: str,
     output: Path,
 ) -> None:
-    """Write DESIGN's controller with its anti-windup and limits; for matlab, simulink and python also its plant.
+    """Write DESIGN's controller as code or data.
 
-    The file NAME_test.csv beside it is a run of `sampled`; the commands of the written controller agree with it.
+    The controller includes the anti-windup and the limits. The files for matlab, simulink and python also hold the
+    plant. NAME_test.csv beside them is a run of `sampled`, with which the commands of the written controller agree.
     """
     from design.design_file import read_design
     from experiments.drive.choose_method import choose_method

@@ -70,7 +70,7 @@ class OutputFolder:
             written = self.written.get(self.name(path))
             if os.path.lexists(path) and (written is None or path.is_symlink()):
                 raise InputError(
-                    f"{path}: is there already, written by somebody else; expected another folder, or --force"
+                    f"{path}: exists already and is not an output of this program; expected another folder, or --force"
                 )
             if written is not None and self.content(path) not in (None, written.content):
                 raise InputError(f"{path}: was changed since it was written; expected another folder, or --force")

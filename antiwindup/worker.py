@@ -60,7 +60,7 @@ def start(command: Sequence[str], log: Path, journal: Path) -> BaseProcess:
         with undisturbed, own_surroundings():
             process.start()
     except (EOFError, OSError) as error:
-        wanted = "packages that load in this folder, and the files and the memory that they need"
+        wanted = "packages that load in this folder, and enough memory and open files for them"
         raise InputError(f"no process can be started ({error}); expected {wanted}") from None
     return process
 

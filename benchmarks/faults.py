@@ -169,7 +169,7 @@ def two_at_once(name: str, design: Path, chance: random.Random) -> list[str]:
             each.pop("manifest.json", None)
         wrong = [] if 0 in statuses else ["neither was done"]
         for status, sentence in zip(statuses, said, strict=True):
-            refused = status == 2 and " is writing it; expected none" in sentence and len(sentence.splitlines()) == 1
+            refused = status == 2 and " is writing it; wait" in sentence and len(sentence.splitlines()) == 1
             wrong += [] if status == 0 or refused else [f"status {status}, {sentence!r}"]
         return wrong + ([] if made in expected else ["a mixture"])
 

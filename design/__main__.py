@@ -71,13 +71,16 @@ def delay_free(
     bandwidth: float | None,
     output: Path,
 ) -> None:
-    """Design by chapter 2: internal model, H-infinity stabiliser, anti-windup. The plant's dead time is ignored."""
+    """Design by chapter 2, without the dead time.
+
+    The design has an internal model, an H-infinity stabiliser and an anti-windup. It ignores the plant's dead time.
+    """
     from design.asked_model import asked_model
     from design.chapter_2.design_delay_free import design_delay_free
 
     if (epsilon is None) != integral_action:
-        found = "both are given" if integral_action else "none is given"
-        raise InputError(f"of --epsilon and --integral-action {found}; expected one of them")
+        found = "both --epsilon and {} are" if integral_action else "neither --epsilon nor {} is"
+        raise InputError(f"{found.format('--integral-action')} given; expected one of them")
     frequencies = asked_frequencies(hertz, omegas)
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
@@ -153,16 +156,16 @@ def extended(
     bandwidth: float | None,
     output: Path,
 ) -> None:
-    """Design by chapters 3 and 4: controller and anti-windup with the exact dead time, for every plant.
+    """Design by chapters 3 and 4, for every plant.
 
-    --reference-hz 0.5 is enough: the command then chooses the rest from the reference, the dead time and W_a, and
-    prints each choice with its reason.
+    The controller and its anti-windup take the exact dead time into account. --reference-hz 0.5 is enough: the
+    command then chooses the rest from the reference, the dead time and W_a, and prints each choice with its reason.
     """
     from design.asked_model import asked_model
     from design.chapters_3_4.design_extended import design_extended
 
     if len(e) != len(f):
-        raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected as many")
+        raise InputError(f"--e is given {len(e)} times and --f {len(f)} times; expected equal numbers")
     frequencies = asked_frequencies(hertz, omegas)
     require_writable(output, inputs=[Path(model)])
     given = asked_model(model)
@@ -192,7 +195,10 @@ def extended(
 @click.option("--denominator", required=True, help="Coefficients of the denominator, highest power first.")
 @OUTPUT
 def anti_windup_command(design: Path, name: str, numerator: str, denominator: str, output: Path) -> None:
-    """Add your own anti-windup theta1~ (strictly proper and stable) to DESIGN."""
+    """Add your own anti-windup theta1~ to DESIGN.
+
+    theta1~ must be strictly proper and stable.
+    """
     from design.anti_windup.compensator import anti_windup
     from design.anti_windup.judge import Compensator, judge
     from design.blocks.block import from_polynomial
@@ -228,7 +234,11 @@ def anti_windup_command(design: Path, name: str, numerator: str, denominator: st
     help="Draw the Nyquist curve with the discs of W_a, |S|, |T| and |W_a C S| to this file: .pdf, .svg or .png.",
 )
 def audit_command(design: Path, windup: float, figure: Path | None) -> None:
-    """Print stability, margins and |W_a C S| of DESIGN with the exact dead time, and judge its anti-windups."""
+    """Judge DESIGN with the exact dead time.
+
+    The command prints the characteristic roots, the margins and |W_a C S| of the linear loop. Then it judges each
+    anti-windup of DESIGN and compares it with no anti-windup.
+    """
     from design.auditing.as_text import audit_text
     from design.auditing.audit_design import audit
     from design.design_file import read_design
@@ -270,20 +280,19 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
     for name, each in design.anti_windup.items():
         judged = each.judgement
         sector = "any" if judged.popov_sector is None else lower_end(judged.popov_sector, 4)
-        stable = "stable" if judged.theta2_stable else "NOT stable: a lasting offset after saturation"
+        stable = "stable" if judged.theta2_stable else "NOT stable: saturation leaves an offset for ever"
         click.echo(f"  anti-windup {name:9s} f = {judged.f:.4g}, Popov sector {sector}, theta2 {stable}")
     click.echo(f"  guarantee of the corrected one: {design.corrected.guarantee}, {design.corrected.guarantee_said}")
 
 
 def _on_the_plant_with_its_dead_time(design: Design) -> str:
-    from design.stability.characteristic_roots import roots_right_of
+    from design.stability.characteristic_roots import roots_right_of, unstable_roots
     from design.stability.margins import delay_loop
 
     if not design.plant.delay_s:
         return ""
     count = roots_right_of(delay_loop(design, design.plant), 0.0)
-    roots = f"{count} root{'s' if count > 1 else ''} in the right half plane"
-    found = f"UNSTABLE ({roots}): for it there is design extended" if count else "stable too"
+    found = f"UNSTABLE ({unstable_roots(count)}): use the command extended" if count else "stable too"
     return (
         f"\n  with the plant's dead time of {design.plant.delay_s:g} s, which this design ignores, the loop is {found}"
     )

@@ -23,7 +23,7 @@ def asked_model(name: str) -> IdentifiedModel:
         return read_model(Path(name))
     data = find_spec("data")
     if data is not None and data.origin is not None and not is_folder(Path(data.origin).with_name("thesis")):
-        raise InputError(f"{name}: no such file, nor can it be one of the thesis's sets, which {data.origin} hides")
+        raise InputError(f"{name}: no such file, and another package 'data' ({data.origin}) hides the thesis's sets")
     from data.thesis import model_named
 
     return model_named(name)

@@ -17,7 +17,7 @@ from design.blocks.inner_outer import inner_outer
 from design.hinf.mixed_sensitivity import Synthesis
 from design.parameters import DelayFreeParameters, ExtendedParameters
 from identification.base.errors import InputError, shown
-from identification.base.json_object import member, number, read_json, texts
+from identification.base.json_object import member, number, read_json, require_known, texts
 from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
 from identification.model.plant_json import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
@@ -123,7 +123,7 @@ class Design:
             from design.anti_windup.other_anti_windups import OTHERS  # only here: nothing else needs them
 
             if asked not in OTHERS:
-                known = f"the design has {', '.join(self.anti_windup)}; of others there are {', '.join(OTHERS)}"
+                known = f"expected {', '.join(self.anti_windup)} of the design, or {', '.join(OTHERS)}"
                 raise InputError(f"there is no anti-windup '{asked}'; {known}")
             return OTHERS[asked](self.linear_loop)
         return asked.kind if isinstance(asked, Compensator) else asked
@@ -145,9 +145,9 @@ class Design:
             return self.blocks["K"] * plant_denominator(self.plant) * self.blocks["Lambda"].inverse(), Block(0.0)
         return self.blocks["K"], self.blocks["T_so"] * inner_outer(self.plant)[0].without_delay()
 
-    def to_json(self) -> str:
-        """The text of design.json; every number is finite or this raises ValueError."""
-        content = {
+    def to_dict(self) -> dict[str, Any]:
+        """The object of design.json."""
+        return {
             "schema": SCHEMA,
             "kind": self.kind,
             "signals": self.signals.to_dict(),
@@ -160,7 +160,10 @@ class Design:
             "anti_windup": {name: each.to_dict() for name, each in self.anti_windup.items()},
             "compared": list(self.compared),
         }
-        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+    def to_json(self) -> str:
+        """The text of design.json; every number is finite or this raises ValueError."""
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
 
 
 def read_design(path: Path | str, kind: str | None = None) -> Design:
@@ -176,7 +179,7 @@ def read_design(path: Path | str, kind: str | None = None) -> Design:
     Raises
     ------
     InputError
-        No such file, not JSON, another schema or kind, or a member missing or of the wrong form.
+        No such file, not JSON, another schema or kind, or a member missing, not known or of the wrong form.
     """
     content = read_json(Path(path), SCHEMA)
     try:
@@ -203,7 +206,10 @@ def read_design(path: Path | str, kind: str | None = None) -> Design:
             signals=Signals.from_dict(member(content, "signals")) if "signals" in content else UNNAMED,
         )
         if (hinf is not None) != delay_free:
-            raise InputError(f"hinf belongs to a delay-free design and to no other; kind is '{design.kind}'")
+            raise InputError(
+                f"kind is '{design.kind}' {'without' if delay_free else 'with'} hinf; expected hinf in a delay-free "
+                "design alone"
+            )
         needed = ("K", "Lambda", "G_A") if delay_free else ("K", "T_so")
         for name in needed:
             if name not in design.blocks:
@@ -214,6 +220,7 @@ def read_design(path: Path | str, kind: str | None = None) -> Design:
         for name, value in (("bandwidth", corrected.bandwidth), ("recovery_s", corrected.judgement.recovery_s)):
             if not 1e-100 < value < 1e100:
                 raise InputError(f"'{name}' of the corrected anti-windup is not a positive number")
+        require_known(content, design.to_dict())
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return design

@@ -8,6 +8,7 @@ from typing import Any
 
 from identification.base.errors import InputError, shown
 from identification.base.json_object import member, number, numbers, record, texts, whole, words
+from identification.model.plant_json import sized
 
 
 @dataclass(frozen=True)
@@ -127,12 +128,14 @@ class ExtendedParameters:
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> ExtendedParameters:
         """Read what :meth:`to_dict` writes; raises InputError when a member is missing or of the wrong form."""
-        found = member(content, "Q")
+        found, inverse_epsilon = member(content, "Q"), sized("inverse_epsilon", number(content, "inverse_epsilon"))
+        if inverse_epsilon < 0:
+            raise InputError(f"inverse_epsilon is {inverse_epsilon:g}; expected no negative number")
         return cls(
             a=number(content, "a"),
             pairs=_pairs(content),
             method=words(content, "method"),
-            inverse_epsilon=number(content, "inverse_epsilon"),
+            inverse_epsilon=inverse_epsilon,
             Q={name: _quotient(member(found, name)) for name in found},
             roll_off=_roll_off(content) if "robust_level" in content else None,
             reasons=texts(content, "reasons") if "reasons" in content else (),

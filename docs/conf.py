@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import sys
 import warnings
 from importlib.metadata import metadata
+from itertools import pairwise
 from pathlib import Path
 from types import GenericAlias
 from typing import TYPE_CHECKING, Any
@@ -29,6 +31,8 @@ ROOT = Path(__file__).resolve().parents[1]
 API = ROOT / "docs" / "reference" / "api"
 COMMANDS = ROOT / "docs" / "reference" / "commands"
 ROOMS = ("identification", "design", "experiments", "paper_figures", "antiwindup")
+WIDE = 35
+"""A table whose columns together take more characters is too wide for a narrow screen."""
 LITERAL = re.compile(r"(``.+?``)")
 sys.path.insert(0, str(ROOT))  # data.thesis
 
@@ -63,7 +67,6 @@ nb_merge_streams = True
 # docstrings
 add_module_names = False
 autodoc_typehints = "none"
-autodoc_default_options = {"members": True, "show-inheritance": False}
 viewcode_follow_imported_members = False  # else the way back from the source of a room's face is lost
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
@@ -83,6 +86,8 @@ html_theme_options = {
     "navigation_with_keys": False,
     "footer_start": ["copyright"],
     "footer_end": [],
+    # their tables take the place of the list of sections
+    "secondary_sidebar_items": {"**": ["page-toc"], "thesis/claims": [], "thesis/equations": []},
 }
 linkcheck_timeout = 20
 
@@ -94,6 +99,20 @@ def mathml(translator: HTML5Translator, node: nodes.Element) -> None:
     display = "inline" if node.tagname == "math" else "block"
     translator.body.append(convert(node.astext(), display=display))
     raise SkipNode
+
+
+def name_cells(app: Sphinx, document: nodes.document, page: str) -> None:
+    """Mark the wide tables; name the column in each of their cells, which a narrow screen shows."""
+    from docutils import nodes
+
+    for table in document.findall(nodes.table):
+        heads, rows = (next(table.findall(kind), []) for kind in (nodes.thead, nodes.tbody))
+        if heads and sum(max(len(cell.astext()) for cell in column) for column in zip(*rows, strict=True)) > WIDE:
+            table["classes"].append("wide")
+            for row in rows:
+                for head, cell in zip(heads[0], row, strict=False):
+                    if cell.astext() and head.astext():
+                        cell[0].insert(0, nodes.inline("", f"{head.astext()}: ", classes=["column"]))
 
 
 def without_substitutions(*arguments: Any) -> None:
@@ -130,8 +149,21 @@ def write_api_pages(app: Sphinx) -> None:
             for module in modules:
                 if module != package:
                     lines += [module.rpartition(".")[2], "-" * len(module), ""]
-                lines += [f".. automodule:: {module}", ""]
+                lines += [f".. automodule:: {module}", f"   :members: {_documented(folder, module)}", ""]
             (API / f"{package}.rst").write_text("\n".join(lines), encoding="utf-8")
+
+
+def _documented(folder: Path, module: str) -> str:
+    """What a module itself documents: autodoc would load all that it imports, too; a package's face may show all."""
+    if not (source := folder / f"{module.rpartition('.')[2]}.py").exists():
+        return ""
+    body = ast.parse(source.read_text(encoding="utf-8")).body
+    names = [each.name for each in body if isinstance(each, ast.FunctionDef | ast.ClassDef)]
+    for assigned, said in pairwise(body):
+        if isinstance(said, ast.Expr) and isinstance(assigned, ast.Assign | ast.AnnAssign):
+            targets = assigned.targets if isinstance(assigned, ast.Assign) else [assigned.target]
+            names += [each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)]
+    return ", ".join(name for name in names if not name.startswith("_"))
 
 
 def write_command_pages(app: Sphinx) -> None:
@@ -185,6 +217,7 @@ def setup(app: Sphinx) -> None:
     app.connect("sphinx-click-process-options", whole_metavars)
     app.connect("autodoc-skip-member", of_others)
     app.connect("doctree-resolved", link_to_source)
+    app.connect("doctree-resolved", name_cells)
     app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
 
 

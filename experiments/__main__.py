@@ -66,7 +66,10 @@ main.add_command(thesis)
 @click.argument("campaign", type=INPUT_FILE)
 @OUTPUT_FOLDER
 def campaign_distributions(campaign: Path, output: Path) -> None:
-    """The distributions of a CAMPAIGN: campaign.csv, campaign_distance.csv, campaign_summary.csv."""
+    """Compute the distributions of a CAMPAIGN.
+
+    The command writes campaign.csv, campaign_distance.csv and campaign_summary.csv.
+    """
     from experiments.campaign.distributions import campaign_tables
 
     write_into(output, campaign_tables(campaign))
@@ -96,7 +99,10 @@ def limits(
     output: Path,
     **reference: Any,
 ) -> None:
-    """Bound the least peak error of any controller within LIMIT: limits_KIND.csv, limits_KIND_summary.csv."""
+    """Bound the least peak error within LIMIT.
+
+    The bound holds for every controller. The command writes limits_KIND.csv and limits_KIND_summary.csv.
+    """
     from tqdm import tqdm
 
     from design.design_file import read_design
@@ -123,7 +129,10 @@ def limits(
 @reference_options
 @OUTPUT_FOLDER
 def compare(design: Path, limit: tuple[float, ...] | None, rate_limit: float, output: Path, **reference: Any) -> None:
-    """Compare the anti-windups of DESIGN with published ones: compare.csv, compare_runs.csv."""
+    """Compare DESIGN with published anti-windups.
+
+    The command writes compare.csv and compare_runs.csv.
+    """
     from tqdm import tqdm
 
     from design.design_file import read_design

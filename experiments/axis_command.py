@@ -40,9 +40,10 @@ def given_keys(options: dict[str, Any]) -> dict[str, Any]:
 @axis_options
 @click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write to.")
 def axis_command(model: str, output: Path, **options: Any) -> None:
-    """Complete what is said of the axis of MODEL: axis.toml, to be given with --axis, and axis.csv with each reason.
+    """Choose what your axis.toml leaves open.
 
-    Without a reference one is chosen that the plant can follow with 80 % of the limits.
+    The command writes axis.toml for MODEL, which other commands read with --axis, and axis.csv with the reason of
+    each choice. Without a reference it chooses one that the plant can follow with 80 % of the limits.
     """
     import os
 

@@ -63,7 +63,7 @@ def choose_axis(model: IdentifiedModel, given: Mapping[str, Any]) -> dict[str, S
     if "reference" in given:
         read_reference(Path(given["reference"]))
         if "limit" not in given:
-            raise InputError("no limits follow from a reference in a file, which has no steady state; expected --limit")
+            raise InputError("a reference in a file has no steady state from which limits follow; expected --limit")
     else:
         _complete_sinusoids(model.plant, found)
     return {name: found[name] for name in KEYS if name in found}
@@ -101,10 +101,10 @@ def _frequency(model: IdentifiedModel, given: Mapping[str, Any]) -> Setting:
     )
     if INSIDE * lowest < highest:
         why = (
-            f"twice the lowest line that every test has, {lowest:.4g} Hz: slow, and an octave within what was measured"
+            f"twice the lowest line that every test has, {lowest:.4g} Hz: slow, and an octave within the measured band"
         )
         return Setting((_rounded(INSIDE * lowest),), why)
-    why = f"amid the lines that every test has, {lowest:.4g} to {highest:.4g} Hz"
+    why = f"the middle of the lines that every test has, {lowest:.4g} to {highest:.4g} Hz"
     return Setting((_rounded(math.sqrt(lowest * highest)),), why)
 
 
@@ -127,7 +127,7 @@ def _complete_sinusoids(plant: PlantModel, found: dict[str, Setting]) -> None:
         needed = reference.required(plant).value
         if not 0 < needed < math.inf:
             raise InputError(
-                f"no limits follow from a reference whose lasting control reaches {needed:g}; expected --limit"
+                f"the reference needs a steady control of {needed:g}, from which no limits follow; expected --limit"
             )
         why = f"ASSUMED: none were given; {ROOM:g} times what the reference takes in the steady state"
         found["limit"] = Setting((-ROOM * needed, ROOM * needed), why)
@@ -151,10 +151,12 @@ def _amplitude_within(plant: PlantModel, found: Mapping[str, Setting], limits: t
         expected = "expected --amplitude"
         if not alone < 0:
             raise InputError(
-                f"without any amplitude the control is not within {SHARE:.0%} of the limits {limits[0]:g} to "
-                f"{limits[1]:g}; {expected}, or another --offset or --limit"
+                f"even at amplitude 0 the control exceeds {SHARE:.0%} of the limits {limits[0]:g} to {limits[1]:g}; "
+                f"{expected}, or another --offset or --limit"
             )
-        raise InputError(f"no amplitude follows from a reference whose lasting control reaches {waves:g}; {expected}")
+        raise InputError(
+            f"amplitude 1 needs a steady control of {waves:g}, from which no amplitude follows; {expected}"
+        )
     return float(brentq(beyond, 0.0, 2 * (2 + alone) * half / waves, xtol=1e-300, rtol=1e-15))
 
 

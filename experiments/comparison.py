@@ -106,7 +106,9 @@ def comparison_tables(
     true = design.loop_plant if plant is None else plant
     needed = required(true, reference)
     if limits is None and not 0 < needed < np.inf:
-        raise InputError(f"the control that the reference needs reaches {needed:g}, from which no limit follows")
+        raise InputError(
+            f"the reference needs a steady control of {needed:g}, from which no limit follows; expected limits"
+        )
     low, high = pair = limit_pair(MULTIPLE * needed if limits is None else limits)
     if not np.isfinite(high - low):
         raise InputError(f"the limits are {low:g} and {high:g}; expected finite ones")

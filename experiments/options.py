@@ -130,7 +130,7 @@ def asked_limits(limit: tuple[float, ...]) -> tuple[float, float]:
     if len(limit) == 2:
         low, high = limit
         if not low < high:
-            raise InputError(f"--limit is {low:g} {high:g}; expected the lower limit first")
+            raise InputError(f"--limit is {low:.12g} {high:.12g}; expected the lower limit first")
         return low, high
     positive_limit(limit[0])
     return -limit[0], limit[0]

@@ -89,7 +89,10 @@ def simulate_command(
     figure: Path | None,
     **reference: Any,
 ) -> None:
-    """Run DESIGN from rest; write time_s, reference, output, error, control, saturated_control (and measured)."""
+    """Run DESIGN from rest in continuous time.
+
+    The columns are time_s, reference, output, error, control and saturated_control; with --noise also measured.
+    """
     import numpy as np
     import pandas as pd
     from tqdm import tqdm
@@ -110,7 +113,7 @@ def simulate_command(
     limits = asked_limits(limit)
     if not 0 < sample_time <= until < math.inf:
         raise InputError(
-            f"--until is {until:g} and --sample-time {sample_time:g}; expected 0 < sample time <= until, both finite"
+            f"--until is {until:.12g} and --sample-time {sample_time:.12g}; expected 0 < sample time <= until < inf"
         )
     _require_few_rows(until / sample_time)
     numbers = {name: value for name, value in (("alpha", alpha), ("beta", beta), ("gamma", gamma)) if value is not None}
@@ -211,10 +214,10 @@ def sampled_command(
     figure: Path | None,
     **reference: Any,
 ) -> None:
-    """Run DESIGN's controller on a computer with a real actuator; write a row for each sample.
+    """Run DESIGN's controller on a computer.
 
-    The columns are those of `simulate`: control is the command of the computer, saturated_control the output of the
-    actuator.
+    The actuator may have levels, a rate limit and a delay. The command writes a row for each sample. The columns are
+    those of `simulate`: control is the command of the computer, saturated_control the output of the actuator.
     """
     import pandas as pd
     from tqdm import tqdm
@@ -258,7 +261,7 @@ def sampled_command(
         found = verdict(guarantee(content, kind, true), run.time_s, run.control, steady, drive.limits)
         promised = str(found)
         if found.covered:
-            promised = f"No guarantee on a computer; in continuous time the run would be within it: {found.needs}"
+            promised = f"No guarantee on a computer; in continuous time it would cover the run: {found.needs}"
     columns = {name: values for name, values in vars(run).items() if values is not None}
     writers = {output: csv_writer(pd.DataFrame(columns))}
     if figure is not None:
@@ -277,9 +280,9 @@ def _unpromised(disturbed: bool, slow: bool, rounds: bool = False) -> str:
     if disturbed:
         return "Whether the guarantee covers the run is not judged under disturbances"
     if slow:
-        return "No guarantee: the actuator was too slow for the control, and a guarantee is of limits alone"
+        return "No guarantee: the rate limit acted, and the guarantee covers saturation limits alone"
     if rounds:
-        return "No guarantee: the actuator rounds the control, and a guarantee is of limits alone"
+        return "No guarantee: the actuator has levels, and the guarantee covers saturation limits alone"
     return ""
 
 
@@ -290,7 +293,7 @@ def _first(promised: str, said: str) -> str:
 
 def _require_few_rows(rows: float) -> None:
     if rows > MOST_ROWS:
-        raise InputError(f"{rows:.3g} rows are asked for; expected at most {MOST_ROWS:.3g}")
+        raise InputError(f"the output has {rows:.3g} rows; expected at most {MOST_ROWS:.3g}")
 
 
 def _inputs(design: Path, plant: str | None, reference: Path | None) -> list[Path]:

@@ -29,7 +29,11 @@ from identification.base.axis_option import AXIS
 @RATE_LIMIT
 @OUTPUT_FOLDER
 def tracking_command(design: Path, limit: tuple[float, ...], rate_limit: float, output: Path, **reference: Any) -> None:
-    """Run DESIGN from rest without, with the corrected and with every added anti-windup: tracking.csv, _summary.csv."""
+    """Run DESIGN with each of its anti-windups.
+
+    Each run starts from rest: without anti-windup, with the corrected one, and with each one that you added. The
+    command writes tracking.csv and tracking_summary.csv.
+    """
     from design.design_file import read_design
     from experiments.asked_reference import reference_of
     from experiments.tracking import tracking_tables
@@ -58,7 +62,10 @@ def rates_command(
     output: Path,
     **reference: Any,
 ) -> None:
-    """Run DESIGN's controller on a computer at 2 to 64 samples per period of its fastest root: rates.csv."""
+    """Run DESIGN's controller at several rates.
+
+    The rates are 2 to 64 samples per period of the loop's fastest root. The command writes rates.csv.
+    """
     from tqdm import tqdm
 
     from design.design_file import read_design

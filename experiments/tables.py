@@ -61,7 +61,7 @@ def read_cells(path: Path, columns: Sequence[str]) -> pd.DataFrame:
             f"{path}: the columns are {', '.join(header)[:LONGEST] or 'none'}; expected {', '.join(columns)}"
         )
     if len(rows) == 1:
-        raise InputError(f"{path}: no rows below the names of the columns")
+        raise InputError(f"{path}: holds a header and no rows; expected one or more")
     return pd.DataFrame(rows[1:], columns=list(columns), dtype=str)
 
 

@@ -36,7 +36,7 @@ class Counts(click.ParamType):  # type: ignore[type-arg]  # generic in the newes
             return None
         words = value.split("/") if "/" in value else [value, value]
         if len(words) != 2 or not all(word in map(str, range(self.most + 1)) for word in words):
-            self.fail(f"'{value}' is no count; expected auto, N or ZEROS/POLES from 0 to {self.most}", param, ctx)
+            self.fail(f"'{value}' is not a count; expected auto, N or ZEROS/POLES from 0 to {self.most}", param, ctx)
         return int(words[0]), int(words[1])
 
 
@@ -75,7 +75,8 @@ reading_options = together(
         "--node",
         type=int,
         help=(
-            "Node to read from a universal file with several: of the response, or of the reference if only that varies."
+            "Node to read from a universal file with several: that of the response, or that of the reference if only "
+            "the references differ."
         ),
     ),
     click.option("--direction", type=int, help="Direction to read from a universal file where the node has several."),
@@ -88,9 +89,7 @@ def _band(
     _ctx: click.Context, _param: click.Parameter, value: tuple[float, float] | None
 ) -> tuple[float, float] | None:
     if value is not None and not 0 <= value[0] < value[1] < inf:
-        raise click.BadParameter(
-            f"{value[0]:g} {value[1]:g} is no band; expected two frequencies in Hz, 0 <= LOW < HIGH"
-        )
+        raise click.BadParameter(f"the band is {value[0]:.12g} to {value[1]:.12g} Hz; expected 0 <= LOW < HIGH")
     return value
 
 
@@ -205,9 +204,11 @@ def fit(
     figure: Path | None,
     **reading: Any,
 ) -> None:
-    """Fit a plant (gain, integrators, modes, real roots, dead time) and its bound W_a to SWEEP files.
+    """Fit a plant and its bound W_a to SWEEP files.
 
-    A SWEEP is a raw record or a frequency response."""
+    The plant has a gain, integrators, modes, real roots and a dead time. A SWEEP is a raw record or a frequency
+    response.
+    """
     from tqdm import tqdm
 
     from identification.fit_model import fit_model

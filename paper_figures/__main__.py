@@ -35,7 +35,10 @@ def main() -> None:
 )
 @OUTPUT
 def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
-    """Draw the figures NAME (for example fig_2_01) as PDF, SVG and PNG with the caption as text."""
+    """Draw the thesis's figures NAME.
+
+    NAME is for example fig_2_01. Each figure is written as PDF, SVG and PNG, and its caption as text.
+    """
     from paper_figures.look import style
     from paper_figures.result_tables import read_table, sentences_of
     from paper_figures.thesis.figure_registry import figure_module
@@ -59,7 +62,10 @@ def draw(names: tuple[str, ...], results: Path, output: Path) -> None:
 )
 @OUTPUT
 def axis_command(names: tuple[str, ...], refit: Path, output: Path) -> None:
-    """Draw the figures NAME (for example run or rates) of a refit, as PDF, SVG and PNG with the caption as text."""
+    """Draw the figures NAME of a refit.
+
+    NAME is for example run or rates. Each figure is written as PDF, SVG and PNG, and its caption as text.
+    """
     from design.design_file import read_design
     from paper_figures.axis_figures.registry import axis_figure
     from paper_figures.look import style
@@ -85,7 +91,11 @@ def axis_command(names: tuple[str, ...], refit: Path, output: Path) -> None:
     help="Existing folder with the designs and the folder results with the tables; the summary is written to it.",
 )
 def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
-    """Sum up MODEL, fitted to SWEEP files: what to do, what to avoid, and why (summary.pdf, .svg, .png, .txt)."""
+    """Sum up MODEL on one page.
+
+    The page says what to do, what to avoid, and why. SWEEP files are those to which MODEL was fitted. The command
+    writes summary.pdf, .svg, .png and .txt.
+    """
     from identification.model.model_file import read_model
     from identification.sweeps.as_fitted import as_fitted
     from identification.sweeps.read_sweeps import read_sweeps
@@ -112,7 +122,10 @@ def summary_command(model: Path, sweeps: tuple[Path, ...], build: Path) -> None:
 @click.argument("sweeps", metavar="SWEEP...", nargs=-1, required=True, type=INPUT)
 @OUTPUT
 def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
-    """Draw a Bode diagram of SWEEP files and MODEL, and the distances under W_a: bode.pdf, .svg, .png, .txt."""
+    """Draw a Bode diagram of SWEEP files and MODEL.
+
+    A third panel shows their distance and the bound W_a. The command writes bode.pdf, .svg, .png and .txt.
+    """
     from identification.model.model_file import read_model
     from identification.sweeps.as_fitted import as_fitted
     from identification.sweeps.read_sweeps import read_sweeps
@@ -145,7 +158,10 @@ def bode_command(model: Path, sweeps: tuple[Path, ...], output: Path) -> None:
     help="Existing folder with claims.csv, the designs, results and figures; report/index.html is written to it.",
 )
 def report_command(model: str, sweeps: tuple[Path, ...], build: Path) -> None:
-    """Write one HTML page with all that was made for MODEL (a model.json, table or implied) and SWEEP files."""
+    """Write one HTML page with all results.
+
+    They are what was made for MODEL (a model.json, table or implied) and the SWEEP files.
+    """
     from paper_figures.result_tables import sentences_of
     from paper_figures.thesis.figure_registry import figure_module, figure_names
     from paper_figures.thesis.report.build_folder import read_build, summaries

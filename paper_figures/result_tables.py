@@ -41,9 +41,9 @@ def read_table(path: Path, figure: str = "summary") -> pd.DataFrame:
     try:
         table = pd.read_csv(StringIO(read_text(path)), comment="#")
     except (pd.errors.ParserError, pd.errors.EmptyDataError):
-        raise InputError(f"{path}: not a table of comma-separated values, which {figure} needs") from None
+        raise InputError(f"{path}: is not a table of comma-separated values, which {figure} needs") from None
     if table.empty:
-        raise InputError(f"{path}: no rows below the names of the columns, which {figure} needs")
+        raise InputError(f"{path}: holds a header and no rows, which {figure} needs")
     for column in table.columns.difference(TEXTS):
         cells = table[column].dropna()
         if (odd := cells[pd.to_numeric(cells, errors="coerce").isna()]).any():
@@ -87,9 +87,9 @@ def sentences_of(
             raise InputError(f"{results / name}.csv: no column {error.args[0]}, which {figure} needs") from None
         if not tables and model is None:
             raise
-        of = [*([f"of {model}"] if model else []), *([f"of {', '.join(tables)} in {results}"] if tables else [])]
-        said = f"{figure} cannot be drawn {' and '.join(of)} ({shown(str(error))})"
-        raise InputError(f"{said}; expected what the commands of the rooms write") from error
+        of = [*([str(model)] if model else []), *([f"{', '.join(tables)} in {results}"] if tables else [])]
+        said = f"{figure} cannot be drawn from {' and '.join(of)} ({shown(str(error))})"
+        raise InputError(f"{said}; expected files as the commands write them") from error
 
 
 def _lacking(error: KeyError, tables: Mapping[str, pd.DataFrame]) -> str | None:

@@ -54,7 +54,7 @@ def chosen_guarantee(
     return (
         guarantee,
         PositiveReal(robustness),
-        f"for every plant within W_a with as many poles in the right half plane {ends}; {shown}",
+        f"for every plant within W_a with as many poles in the right half plane as the model {ends}; {shown}",
     )
 
 
@@ -75,6 +75,6 @@ def why_not_global(unstable: Sequence[complex]) -> str:
     if len(unstable) > 1:
         return (
             f"no guarantee for every control exists: for {len(unstable)} integrators 1 + theta1~ falls like "
-            f"s^{len(unstable)} at s = 0, and no positive real function faster than s"
+            f"s^{len(unstable)} at s = 0, and no positive real function falls faster than s"
         )
     return ""

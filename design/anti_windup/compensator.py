@@ -114,7 +114,9 @@ def from_one_plus(one_plus: Block) -> AntiWindup:
         It is not.
     """
     if one_plus.relative_degree or one_plus.gain != 1 or not one_plus.is_stable or one_plus.delay_s:
-        raise InputError("1 + theta1~ is not stable with as many zeros as poles and the value 1 at infinity")
+        raise InputError(
+            "1 + theta1~ is unstable, has a dead time or differs from 1 at infinite frequency; expected none of these"
+        )
     q = geometric_scale(Block(1.0, one_plus.poles))
     numerator, denominator = (polynomial(Block(1.0, roots), q) for roots in (one_plus.zeros, one_plus.poles))
     return AntiWindup(from_polynomial(numerator - denominator, q) * Block(1.0, (), one_plus.poles), one_plus)
@@ -126,8 +128,8 @@ def _require_strictly_proper_and_stable(theta1_tilde: Block) -> None:
     if theta1_tilde.relative_degree < 1 or not theta1_tilde.is_stable or theta1_tilde.delay_s:
         raise InputError(
             f"theta1~ has {len(theta1_tilde.zeros)} zeros and the poles "
-            f"{', '.join(f'{pole:.4g}' for pole in theta1_tilde.poles) or 'none'}; expected it strictly proper and "
-            "stable, without dead time"
+            f"{', '.join(f'{pole:.4g}' for pole in theta1_tilde.poles) or 'none'}; expected a strictly proper "
+            "and stable one without dead time"
         )
 
 

@@ -120,7 +120,7 @@ class PositiveReal:
             x, omega = self.robustness.largest
             if x >= REACHED:
                 raise InputError(
-                    f"|W_a C S| reaches {x:.4g} at {omega:.4g} rad/s; a robust guarantee expects less than 1/2"
+                    f"|W_a C S| reaches {x:.4g} at {omega:.4g} rad/s; expected less than 1/2 for a robust guarantee"
                 )
 
     def __str__(self) -> str:

@@ -108,12 +108,12 @@ def corrected(
     the condition and f as computed from the roots.
     """
     if not 0 < recovery_s < np.inf:
-        raise InputError(f"the recovery time is {recovery_s:g} s; expected a positive one")
+        raise InputError(f"the recovery time is {recovery_s:g} s; expected a positive number")
     slowest = float(np.log(1 / SETTLED)) / recovery_s
     if not slowest * (1 - 1e-9) <= bandwidth < np.inf:
         raise InputError(
-            f"the bandwidth of the anti-windup is {bandwidth:g} rad/s; expected {slowest:g} or more and a finite one, "
-            f"since the recovery in {recovery_s:g} s takes this rate"
+            f"the bandwidth of the anti-windup is {bandwidth:.9g} rad/s; expected a finite one of at least "
+            f"{slowest:.9g} rad/s, which the recovery in {recovery_s:g} s needs"
         )
     decades = min(float(np.log10(bandwidth / slowest)) + 1e-9, DECADES if faster else np.inf)
     slowest = bandwidth / 10**decades
@@ -135,8 +135,8 @@ def corrected(
         search.take_washout(unstable, bandwidth)
     if search.best is None:
         raise NoCompensatorError(
-            f"no theta1~ of our class with poles from {slowest:g} to {bandwidth:g} rad/s was found that meets "
-            f"{condition}; expected a weaker guarantee or a slower recovery"
+            f"no theta1~ with poles from {slowest:g} to {bandwidth:g} rad/s that meets {condition} was found; expected "
+            "a weaker guarantee or a slower recovery"
         )
     f, _ = uncertainty_cost(bound, search.best.one_plus)
     return Corrected(search.best, f, max(search.floor, min(f, float(proved.min()), search.best_lower)))

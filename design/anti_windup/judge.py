@@ -144,7 +144,8 @@ class CorrectedCompensator(Compensator):
         if (found.sector is None) != (found.guarantee != "sector") or (found.certificate is None) != (
             found.guarantee == "sector"
         ):
-            raise InputError(f"the guarantee '{found.guarantee}' has either a sector or a certificate that is not its")
+            needed = "a sector and no certificate" if found.guarantee == "sector" else "a certificate and no sector"
+            raise InputError(f"the guarantee is '{found.guarantee}'; expected {needed} beside it")
         if found.certificate is not None:
             proved_storage(found.kind.one_plus, found.certificate)
         return found

@@ -122,7 +122,7 @@ def proved_storage(M: Block, rows: Rows) -> Storage:
     """
     rates, n, at_zero = _rates(M), len(M.poles), M.zeros.count(0j)
     if len(rows) != n or any(len(row) != n for row in rows) or rows != tuple(zip(*rows, strict=True)):
-        raise InputError(f"the certificate of the anti-windup is no symmetric matrix; expected one with {n} rows")
+        raise InputError(f"the certificate of the anti-windup is not a symmetric matrix; expected one with {n} rows")
     P = fmpq_mat(n, n, [exact(value) for row in rows for value in row])
     at_infinity, C = _along_chain(real_polynomial(M.zeros), rates)
     A, b = _chain(rates)
@@ -146,7 +146,7 @@ def _rates(M: Block) -> list[fmpq]:
     """The p_k, exactly."""
     if any(pole.imag or pole.real >= 0 for pole in M.poles) or len(M.zeros) != len(M.poles):
         raise InputError(
-            "1 + theta1~ has complex or unstable poles, or another number of zeros; a certificate has none"
+            "1 + theta1~ has complex or unstable poles, or fewer zeros than poles; expected neither with a certificate"
         )
     return sorted((exact(-pole.real) for pole in M.poles), reverse=True)
 

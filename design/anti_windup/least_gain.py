@@ -75,7 +75,7 @@ def weston_postlethwaite(plant: PlantModel, bandwidth: float) -> LeastGain:
     """
     block = plant_block(plant).without_delay()
     if not block.poles:
-        raise InputError("the plant has no pole, so that there are no coprime factors to choose")
+        raise InputError("the plant has no pole; expected one or more, since the method chooses coprime factors")
     import cvxpy as cp
 
     unit = geometric_scale(block)
@@ -117,8 +117,8 @@ def static(plant: PlantModel, g: Block, poles: Sequence[complex]) -> LeastGain:
     own = Block(1.0, (), tuple(poles))
     if not ((block * g).is_stable and own.is_stable and poles):
         raise InputError(
-            "no constant gain to the controller's states makes theta2 stable: the controller cancels the plant's poles "
-            "with Re s >= 0; expected an extended design"
+            "the controller cancels the plant's poles with Re s >= 0, so that no static anti-windup makes theta2 stable"
+            "; expected an extended design"
         )
     import cvxpy as cp
 
@@ -191,5 +191,5 @@ def _solve(
     size = np.sqrt(np.maximum(sizes, np.finfo(float).tiny))
     eigenvalues = np.linalg.eigvalsh(inequality.value / np.outer(size, size))
     if not (eigenvalues[-1] <= ROUNDING * -eigenvalues[0] and np.linalg.eigvalsh(Q.value)[0] > 0):
-        raise InputError(f"the linear matrix inequality is not solved to rounding for the sector {k:g}")
+        raise InputError(f"the linear matrix inequality is solved too inaccurately for the sector {k:g}")
     return found

@@ -54,7 +54,7 @@ def back_calculation(loop: LinearLoop) -> BackCalculation:
     """
     poles = _axis_poles(loop)
     if not poles:
-        raise InputError("the controller has no pole on the imaginary axis; back-calculation feeds an integrator")
+        raise InputError("the controller has no pole on the imaginary axis; expected one for back-calculation")
     scale = float(np.log(1 / SETTLED)) / loop.recovery_s
     derivative = from_polynomial(np.polyder(np.real(np.poly(poles))))
     fed = derivative.scaled(scale) * Block(1.0, (), poles)
@@ -75,8 +75,8 @@ def conditioning(loop: LinearLoop) -> AntiWindup:
     answer = loop.forward if loop.pole is not None else loop.forward * _sensitivity(loop)
     if answer.relative_degree:
         raise InputError(
-            f"the controller has {answer.relative_degree} more poles than zeros; conditioning expects equally many, so "
-            "that some reference gives the saturated control at once"
+            f"the controller has {answer.relative_degree} more poles than zeros; expected as many zeros as poles for "
+            "conditioning, which inverts it at infinite frequency"
         )
     return from_one_plus(Block(1.0, answer.zeros, answer.poles))
 
@@ -92,7 +92,9 @@ def observer(loop: LinearLoop) -> AntiWindup:
         The design is of chapter 2, whose controller has no predictor.
     """
     if loop.pole is None:
-        raise InputError("the design is 'delay-free', without a predictor that sat(u) could drive; expected 'extended'")
+        raise InputError(
+            "the design is 'delay-free', which has no Smith predictor for sat(u) to drive; expected 'extended'"
+        )
     anchors = plant_block(loop.plant).unstable_poles
     return from_one_plus(Block(1.0, anchors, (complex(-loop.pole),) * len(anchors)))
 
@@ -111,7 +113,7 @@ def internal_model(loop: LinearLoop) -> AntiWindup:
     if poles := plant_block(loop.plant).unstable_poles:
         pole = max(poles, key=lambda each: each.real)
         at = f"{pole.real:.4g}" + (f" +- {abs(pole.imag):.4g}j" if pole.imag else "")
-        raise InputError(f"the plant has a pole at {at} rad/s; the internal model expects a stable plant")
+        raise InputError(f"the plant has a pole at {at} rad/s; expected a stable plant for the internal model")
     return AntiWindup(Block(0.0), Block(1.0))
 
 

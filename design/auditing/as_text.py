@@ -39,14 +39,14 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
     else:
         roots, hidden = found.roots.roots, found.roots.hidden
         roots = np.where(np.abs(roots.imag) > found.roots.uncertainty, roots, roots.real)
-        moved = _roots(roots[~hidden]) or f"none right of {found.roots.line:.4g} 1/s, where rounding hides them"
+        moved = _roots(roots[~hidden]) or f"none right of {found.roots.line:.4g} 1/s, the limit set by rounding errors"
         lines.append(f"  rightmost characteristic roots  {moved}")
         lines.append(f"  cancelled between the blocks    {_roots(roots[hidden]) or 'none'}")
     lines += _form_lines(design)
     lines += _margin_lines(found.margins)
     lines.append(
-        f"  |W_a/P| at the reference        {found.tracking_floor:.4g}: no controller that follows it has a smaller "
-        "peak"
+        f"  |W_a/P| at the reference        {found.tracking_floor:.4g}: every controller that follows it has this "
+        "|W_a C S| there"
     )
     covered = _covered(found.covered_delay_s)
     gain = "; no other gain of the integrator" if design.plant.integrators > 0 else ""
@@ -73,7 +73,7 @@ def audit_text(design: Design, found: Audit, windup: float) -> str:
         f"beta = {beta:.4g} s, gamma = {gamma:.4g}, f = {f:.4g}.",
     ]
     if bound_block(design.additive_bound).relative_degree > 0:
-        lines.append("Without such a bound on the poles there is none: f vanishes as alpha, beta -> 0 and gamma -> -1.")
+        lines.append("Without this bound on the poles, f tends to 0 as alpha, beta -> 0 and gamma -> -1.")
     return "\n".join(lines)
 
 
@@ -86,9 +86,9 @@ def _form_lines(design: Design) -> list[str]:
     integral = "integral" if len(anchors) == 1 else "double integral"
     moves = f"y grows like exp({fastest:.4g} t)" if fastest > 0 else f"y drifts as the {integral} of it"
     return [
-        f"  hidden as drawn in Fig. 2.6     {_roots(np.array(anchors))}: what is rounded inside the controller, or a "
-        f"state that does not start at rest, stays: {moves}",
-        "  hidden as a computer runs it    none in Re s >= 0 (sampled; --form thesis runs the drawn form)",
+        f"  hidden as drawn in Fig. 2.6     {_roots(np.array(anchors))}: no feedback corrects a rounding error or an "
+        f"initial state in them: {moves}",
+        "  hidden on a computer            none in Re s >= 0 (sampled; --form thesis runs the drawn form)",
     ]
 
 
@@ -144,7 +144,7 @@ def _margin_lines(margins: Margins | str | None) -> Iterable[str]:
     if not isinstance(margins, Margins):
         return [f"  no margins                      {margins}"]
     guarantee = (
-        "the loop around every plant within W_a with as many poles in Re s > 0 is stable"
+        "the loop is stable with every plant within W_a that has as many poles in Re s > 0 as the model"
         if margins.is_guaranteed
         else "NO guarantee for the plants within W_a"
     )

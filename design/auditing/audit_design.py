@@ -111,6 +111,8 @@ def audit(design: Design) -> Audit:
     if isinstance(chosen, ExtendedParameters) and not chosen.inverse_epsilon and "C0" in design.blocks:
         s = 1j * frequency_grid(shapes, per_decade=20)
         s = s[np.abs(s) > 1e-2 * chosen.a]  # below, both are differences that vanish
+        if not s.size:
+            raise InputError(f"the parameter a is {chosen.a:g} rad/s; expected one among the blocks' frequencies")
         C_s = smith_controller(plant, design.blocks["C0"], s)
         same = float(np.max(np.abs(anti_windup_controller(plant, forward, feedback, s) / C_s - 1)))
     reached = interval = None

@@ -142,7 +142,7 @@ def polynomial_roots(polynomial: arb_poly) -> list[acb]:
     Raises
     ------
     UndecidedError
-        Roots are not told apart at this precision.
+        Two roots are too close to separate at this precision.
 
     Notes
     -----
@@ -162,7 +162,7 @@ def polynomial_roots(polynomial: arb_poly) -> list[acb]:
     if len(discs) != degree or any(
         first.overlaps(second) for k, first in enumerate(discs) for second in discs[k + 1 :]
     ):
-        raise UndecidedError("two roots are not told apart")
+        raise UndecidedError("two roots are too close to separate")
     # the conjugate of a root is a root: of its own disc unless another is met
     result = []
     for k, disc in enumerate(discs):
@@ -193,11 +193,11 @@ def right_half_plane_roots(squares: Iterable[acb]) -> list[acb]:
     Raises
     ------
     UndecidedError
-        A root is not told from the imaginary axis.
+        A root may lie on the imaginary axis.
     """
     found = [square.sqrt() for square in squares]
     if not all(root.real > 0 for root in found):
-        raise UndecidedError("a root is on the imaginary axis")
+        raise UndecidedError("a root may lie on the imaginary axis")
     return found
 
 

@@ -21,6 +21,9 @@ from identification.model.python_control import from_control, to_control
 if TYPE_CHECKING:
     from control import TransferFunction
 
+LARGEST_ROOT = 1e30
+"""rad/s: no part of a root that is read from a file may be larger; products of larger ones overflow."""
+
 
 @dataclass(frozen=True)
 class Block:
@@ -84,7 +87,9 @@ class Block:
         return Block(self.gain, zeros, poles)
 
     def inverse(self) -> Block:
-        """1/block; raises InputError when it has a dead time, whose inverse is not causal."""
+        """1/block; raises InputError when it is 0, or has a dead time, whose inverse is not causal."""
+        if self.gain == 0:
+            raise InputError("a block's gain is 0; expected any other number, for it is inverted")
         return Block(1 / self.gain, self.poles, self.zeros, -self.delay_s)
 
     def without_delay(self) -> Block:
@@ -144,7 +149,10 @@ def _listed(content: Mapping[str, Any], key: str) -> tuple[complex, ...]:
     """The roots at ``key``, a list of pairs of numbers."""
     if not isinstance(content[key], list):
         raise InputError(f"{key} is {shown(content[key])}; expected a list of pairs of numbers")
-    return tuple(complex(real, imag) for real, imag in (numbers({key: root}, key) for root in content[key]))
+    roots = tuple(complex(real, imag) for real, imag in (numbers({key: root}, key) for root in content[key]))
+    if any(max(abs(root.real), abs(root.imag)) > LARGEST_ROOT for root in roots):
+        raise InputError(f"{key} is {shown(content[key])}; expected numbers of at most {LARGEST_ROOT:g} rad/s")
+    return roots
 
 
 def mode_product(gain: float, modes: Iterable[Mode], rates: Iterable[float] = ()) -> Block:

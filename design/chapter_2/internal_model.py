@@ -112,19 +112,19 @@ def internal_model(
 
 
 def _require_reference(omegas: Sequence[float], epsilon: float | None) -> None:
-    shown = ", ".join(f"{omega:g}" for omega in omegas)
+    shown = ", ".join(f"{omega:.12g}" for omega in omegas)
     if len(set(omegas)) < len(omegas):
         raise InputError(f"the reference has omega = {shown} rad/s; expected each frequency once")
     if len(omegas) and min(omegas) == 0:
         hertz = ", ".join(f"{omega / math.tau:g}" for omega in omegas)
         raise InputError(
-            f"the reference has the frequencies {hertz} Hz, a constant among them, which the delay-free design does "
-            "not take; expected positive ones (its integral action, --integral-action, is what follows a constant)"
+            f"the reference has the frequencies {hertz} Hz; expected positive ones for a delay-free design, which "
+            "follows a constant by --integral-action"
         )
     if not (len(omegas) and all(np.isfinite(omega) and omega > 0 for omega in omegas)):
         raise InputError(f"the reference has omega = {shown} rad/s; expected one or more positive numbers")
     if epsilon is not None and not 0 < epsilon < min(omegas) ** 2:
-        raise InputError(f"omega = {shown} rad/s and epsilon = {epsilon:g}; expected 0 < epsilon < omega^2")
+        raise InputError(f"omega = {shown} rad/s and epsilon = {epsilon:.12g}; expected 0 < epsilon < omega^2")
 
 
 def _require_class(plant: PlantModel) -> None:
@@ -132,21 +132,19 @@ def _require_class(plant: PlantModel) -> None:
     if plant.integrators < 0:
         zeros = "a zero" if plant.integrators == -1 else f"{-plant.integrators} zeros"
         raise InputError(
-            f"the plant has {zeros} at s = 0, so that a constant input leaves no output and no bounded input holds "
-            "one; the design expects none there, and every zero in the left half plane"
+            f"the plant has {zeros} at s = 0, so that no bounded input holds a constant output; expected every zero in "
+            "the left half plane"
         )
     for root in plant.right_zeros:
         raise InputError(
-            f"the plant has a zero in the right half plane, at {_shown(root)} rad/s, which is a pole of "
-            "F2 = (Lambda - A)/B: the input that makes y follow at once grows without bound; the design expects every "
-            "zero in the left half plane"
+            f"the plant has a zero in the right half plane, at {_shown(root)} rad/s, which is an unstable pole of "
+            "F2 = (Lambda - A)/B; expected every zero in the left half plane"
         )
     for root in plant_denominator(plant).zeros:
         if root.real > 0:
             raise InputError(
-                f"the plant has a pole in the right half plane, at {_shown(root)} rad/s, which C = K A/Lambda cancels: "
-                "the loop does not see it, and y grows without bound after any disturbance; the design expects stable "
-                "poles and up to two integrators"
+                f"the plant has a pole in the right half plane, at {_shown(root)} rad/s, which C = K A/Lambda cancels, "
+                "so that y grows without bound after a disturbance; expected stable poles and at most two integrators"
             )
 
 
@@ -167,5 +165,5 @@ def _difference(first: Block, second: Block) -> Block:
 
     found = decided(compute)
     if found is None:
-        raise InputError("the zeros of F2, roots of Lambda - A, are not told apart; expected another reference")
+        raise InputError("the zeros of F2, roots of Lambda - A, are too close to separate; expected another reference")
     return found

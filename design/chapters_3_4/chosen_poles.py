@@ -129,8 +129,8 @@ def chosen_pace(
         options += _options(plant, bound, wanted, a, level)
     if not options:
         raise InputError(
-            f"no closed loop of a pace from {bottom:.3g} to {top:.3g} rad/s has |W_a C S| <= {level:g}; "
-            "expected a tighter W_a or another frequency of the reference"
+            f"no pole a of the loop from {bottom:.3g} to {top:.3g} rad/s gives |W_a C S| <= {level:g}; expected a "
+            "tighter W_a or another frequency of the reference"
         )
     calm = [option for option in options if option.sensitivity <= CALM * PEAK]
     best = min(calm or options, key=lambda option: (-option.pace if calm else 0.0, option.sensitivity))

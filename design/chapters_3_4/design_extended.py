@@ -83,8 +83,8 @@ def design_extended(
     as_printed = own_level and is_of_thesis_class(plant) and (plant.relative_degree == 1 or inverse_epsilon > 0)
     if not as_printed and (method != "zeros" or inverse_epsilon):
         raise InputError(
-            "a design with a roll-off, or of a chosen a, is by the zeros of Q with the exact inverse; found "
-            f"the method '{method}' and epsilon = {inverse_epsilon:g} s"
+            f"the interpolation is '{method}' and epsilon {inverse_epsilon:g} s; expected 'zeros' and 0 for a design "
+            "with a roll-off or with a chosen a"
         )
     if a is not None and as_printed:
         T_so, parameters = _as_printed(plant, omegas, a, pairs, method, inverse_epsilon)
@@ -167,7 +167,7 @@ def _rolled_off(
     found = robust_outer_part(plant, bound, wanted, a, poles, level, order, most)
     if found.sensitivity > most:  # which the choice saw on a coarse grid alone
         most = np.inf
-        reasons.append(f"||S|| is {found.sensitivity:.3g} all the same: no roll-off that was tried keeps it")
+        reasons.append(f"||S|| is {found.sensitivity:.3g} nevertheless: no roll-off that was tried keeps it smaller")
     count = "one pole" if found.order == 1 else f"{found.order} poles"
     calm = f" and ||S|| <= {most:g}" if most < np.inf else ""
     reasons.append(

@@ -100,8 +100,7 @@ def coprime_form(K: Block, T: Block, anchors: tuple[complex, ...], a: float, lat
     through = T.without_delay() * shared
     if any(anchor in forward.poles for anchor in anchors) or (late is None and through.relative_degree < 0):
         raise InputError(
-            f"the controller has not the plant's {q} poles in Re s >= 0 as zeros, or T too few poles more than zeros; "
-            "expected a design that 'python -m design extended' wrote"
+            "the blocks K and T do not belong to the plant; expected a design that 'python -m design extended' wrote"
         )
     if not q:
         return CoprimeForm(forward, Block(0.0), through, (), (), T.delay_s)
@@ -109,7 +108,7 @@ def coprime_form(K: Block, T: Block, anchors: tuple[complex, ...], a: float, lat
     E = interpolating(points, late or partial(_exponential, T.delay_s), 1.0)
     rest = decided(lambda: _rest(through, anchors, a, E))
     if rest is None:
-        raise InputError("the controller's stable factors are not told from rounding; expected other poles of T_so")
+        raise InputError("rounding errors exceed the controller's stable factors; expected other poles of T_so")
     return CoprimeForm(forward, rest, through, anchors, tuple(float(e) for e in reversed(E)), T.delay_s)
 
 

@@ -162,8 +162,8 @@ def robust_outer_part(
     if met:
         return min(met, key=lambda redesign: redesign.sensitivity)
     raise InputError(
-        f"no roll-off tried, of up to {orders[-1]} poles, brings ||W_a C S|| below {best:.4g}, the level is "
-        f"{level:g}; expected a slower a, e and f (no controller gets below {floor:.4g})"
+        f"||W_a C S|| is {best:.6g} or more with every roll-off tried, of up to {orders[-1]} poles; expected at most "
+        f"{level:g}, for example by a smaller a, e and f (every controller has {floor:.4g} or more)"
     )
 
 
@@ -187,8 +187,8 @@ def require_possible(
         beyond = at[int(np.argmax(values))]
         accepted = "a level above that, or " if floor < 1 else ""
         raise InputError(
-            f"|W_a/P| is {floor:.4g} at {beyond:.6g} rad/s, and so is |W_a C S| for every controller that follows a "
-            f"reference there; expected less than the level {level:g}: {accepted}{_known(plant, bound, level, band)}"
+            f"|W_a C S| is |W_a/P| = {floor:.6g} at {beyond:.6g} rad/s with every controller that follows a reference "
+            f"there; expected less than the level {level:g}: {accepted}{_known(plant, bound, level, band)}"
         )
     return floor
 
@@ -202,12 +202,14 @@ def _known(plant: PlantModel, bound: AdditiveBound, level: float, band: tuple[fl
     starts, ends = np.flatnonzero(np.diff(below.astype(int)) == 1), np.flatnonzero(np.diff(below.astype(int)) == -1) - 1
     if not len(starts):
         measured = " where it was measured" if band[1] < np.inf else ""
-        return f"a tighter W_a, by more poles of it or more alike tests (|W_a/P| is below the level nowhere{measured})"
+        return (
+            f"a tighter W_a, by more poles of it or more similar tests (nowhere{measured} is |W_a/P| below the level)"
+        )
     widest = int(np.argmax(omega[ends] / omega[starts]))
     low, high = omega[starts[widest]], omega[ends[widest]]
     return (
-        "a tighter W_a, by more poles of it or more alike tests, or another frequency (|W_a/P| is below the level from "
-        f"{low:.4g} to {high:.4g} rad/s)"
+        "a tighter W_a, by more poles of it or more similar tests, or another frequency (|W_a/P| is below the level "
+        f"from {low:.4g} to {high:.4g} rad/s)"
     )
 
 

@@ -99,8 +99,8 @@ def stabiliser(plant: PlantModel, T_so: Block, inverse_epsilon: float = 0.0) -> 
     K = T_so * inner_outer(plant)[1].inverse() * _lag(inverse_epsilon)
     if K.relative_degree < 0:
         raise InputError(
-            f"the plant has {plant.relative_degree} poles more than zeros and T_so {T_so.relative_degree}, so that the "
-            f"controller is improper; expected {-K.relative_degree} poles more of T_so (a roll-off, by a robust level)"
+            f"the plant has {plant.relative_degree} more poles than zeros and T_so only {T_so.relative_degree}, so the "
+            f"controller is improper; expected {-K.relative_degree} more poles of T_so (--robust-level adds them)"
         )
     return K
 

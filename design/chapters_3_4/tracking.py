@@ -95,7 +95,7 @@ def tracking_conditions(
     for omega in omegas:
         if omega and complex(0, omega) in plant_block(plant).zeros:
             raise InputError(
-                f"the plant passes nothing at {omega:g} rad/s, where it has a zero; expected another frequency"
+                f"the plant has a zero at the reference's frequency {omega:g} rad/s; expected another frequency"
             )
     one_more = plant.integrators >= 0 and (integral_action or 0 in omegas)
     return TrackingConditions(
@@ -120,7 +120,7 @@ def outer_part(wanted: TrackingConditions, poles: Sequence[complex]) -> Block:
     Raises
     ------
     InputError
-        Two points are so near each other that the zeros of n are not told from rounding.
+        Two points are so near each other that rounding errors exceed the coefficients of n.
 
     Notes
     -----
@@ -131,7 +131,7 @@ def outer_part(wanted: TrackingConditions, poles: Sequence[complex]) -> Block:
     unit = 2.0 ** round(float(np.log2(np.mean(np.abs(poles)))))
     n = decided(lambda: factored(interpolating(wanted.points, partial(_target, wanted, poles), unit), unit))
     if n is None:
-        raise InputError("the numerator of T_so could not be told from rounding; expected frequencies farther apart")
+        raise InputError("rounding errors exceed the numerator of T_so; expected frequencies farther apart")
     return Block(n.gain, n.zeros + (0j,) * wanted.zeros_at_zero, tuple(poles))
 
 

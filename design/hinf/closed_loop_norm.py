@@ -46,7 +46,7 @@ def closed_loop_norm(G: Block, W1: Block, W2: Block, K: Block, decay_rate: float
         numerator += squared(x.gain(W2) * x.gain(L) * x.polynomial((*second.zeros, *own1)))
         denominator = squared(x.polynomial((*common, *own1, *own2)) * characteristic)
         if numerator.degree() > denominator.degree():
-            raise InputError("1 + G K is zero at infinite frequency: the loop is not well posed")
+            raise InputError("1 + G K is zero at infinite frequency; expected a well-posed loop")
         level = _ratio(numerator[denominator.degree()], denominator[denominator.degree()])
         squares = [arb(0), *(-(abs(root) ** 2).mid() for root in x.points((*L.poles, *first.poles, *second.poles)))]
         while squares:  # -omega^2 at which the level is tried
@@ -57,12 +57,14 @@ def closed_loop_norm(G: Block, W1: Block, W2: Block, K: Block, decay_rate: float
             crossings.sort(key=float)
             squares = [-(low * high).sqrt().mid() for low, high in pairwise(crossings)]
         if not polynomial(arb(0)) > 0:
-            raise UndecidedError("the level at omega = 0 is not decided")
+            raise UndecidedError("the norm at omega = 0 may exceed the level")
         return float(level * (1 + arb(MARGIN)))
 
     found = decided(bound)
     if found is None:
-        raise InputError("rounding hides the norm of the closed loop: W1 S and W2 T are constant or nearly")
+        raise InputError(
+            "rounding errors are too large for the closed loop's norm; expected W1 S and W2 T that vary with frequency"
+        )
     return found
 
 
@@ -88,10 +90,12 @@ def closed_loop_poles(G: Block, K: Block) -> tuple[complex, ...]:
         x = line(0.0, G, K)
         characteristic = x.polynomial(L.poles) + x.gain(L) * x.polynomial(L.zeros)
         if characteristic.degree() < max(len(poles), len(zeros)):
-            raise InputError("1 + G K is zero at infinite frequency: the loop is not well posed")
+            raise InputError("1 + G K is zero at infinite frequency; expected a well-posed loop")
         return [x.back(root) for root in polynomial_roots(characteristic)]
 
     found = decided(roots)
     if found is None:
-        raise InputError("rounding hides the poles of the closed loop: one is multiple, or at 0, or nearly")
+        raise InputError(
+            "rounding errors are too large for the closed loop's poles; expected them distinct and away from 0"
+        )
     return (*cancelled, *found)

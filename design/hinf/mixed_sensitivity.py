@@ -156,7 +156,7 @@ def _assess(problem: Problem, K: Block, line_bound: Obstacle) -> Synthesis:
     slowest = max(pole.real for pole in closed_loop_poles(G, K))
     if slowest >= -decay_rate:
         raise SynthesisError(
-            f"with K a closed-loop pole lies at Re s = {slowest:.6g}; expected all of them left of {0 - decay_rate:.6g}"
+            f"K gives a closed-loop pole with Re s = {slowest:.6g}; expected Re s < {0 - decay_rate:.6g} for all poles"
         )
     line = closed_loop_norm(G, W1, W2, K, decay_rate)
     bound, norm = line_bound, line
@@ -209,15 +209,17 @@ def synthesise(problem: Problem, suboptimality: float = SUBOPTIMALITY) -> tuple[
     most = bound.gamma * (1 + suboptimality)
     K = central_controller(problem, most * (1 - ROUNDING * suboptimality))
     if K is None:
-        raise SynthesisError(f"rounding hides the controller for the norm {most:.6g}")
+        raise SynthesisError(
+            f"rounding errors are too large for the controller of norm {most:.6g}; expected other weights"
+        )
     slowest = max(pole.real for pole in closed_loop_poles(G, K))
     norm = math.inf if slowest >= -decay_rate else closed_loop_norm(G, problem.W1, problem.W2, K, decay_rate)
     if norm > most:
-        missed = f"the norm {norm:.6g}" if norm < math.inf else f"a closed-loop pole at Re s = {slowest:.4g}"
+        missed = f"the norm {norm:.6g}" if norm < math.inf else f"a closed-loop pole with Re s = {slowest:.4g}"
         raise SynthesisError(
-            f"no controller brings the norm below {bound.gamma:.6g}, and the one for {most:.6g} whose loop decays with "
-            f"{decay_rate:.4g} 1/s, rounded to doubles, has {missed}; expected a reference, poles and weights that lie "
-            "fewer decades apart and not so near each other"
+            f"the controller for the norm {most:.6g} and the decay rate {decay_rate:.4g} 1/s, rounded to doubles, has "
+            f"{missed}; expected frequencies, poles and weights fewer decades apart and not so near each other (no "
+            f"controller has a norm below {bound.gamma:.6g})"
         )
     return K, bound
 
@@ -225,23 +227,27 @@ def synthesise(problem: Problem, suboptimality: float = SUBOPTIMALITY) -> tuple[
 def _check(problem: Problem) -> None:
     G, W1, W2, decay_rate = problem.G, problem.W1, problem.W2, problem.decay_rate
     if not (math.isfinite(decay_rate) and decay_rate >= 0):
-        raise InputError(f"the decay rate is {decay_rate:g}; expected a number of 1/s that is not negative")
+        raise InputError(f"the decay rate is {decay_rate:g}; expected zero or a positive number of 1/s")
     if G.delay_s or G.relative_degree < 0:
-        raise InputError("the mixed sensitivity problem needs a proper plant without dead time")
+        raise InputError("G is improper or has a dead time; expected a proper plant without dead time")
     if W1.relative_degree < 0 or (W2 * G).relative_degree != 0:
-        raise InputError("the mixed sensitivity problem needs a proper W1 and a biproper W2 G")
+        raise InputError(
+            "W1 is improper, or W2 G has unequal numbers of zeros and poles; expected a proper W1 and a biproper W2 G"
+        )
     if 0 in (G.gain, W1.gain, W2.gain) or not G.poles + W1.poles:
-        raise InputError("the mixed sensitivity problem needs dynamics in G or W1, and neither these nor W2 zero")
+        raise InputError(
+            "G, W1 or W2 is zero, or neither G nor W1 has a pole; expected none zero, and a pole of G or W1"
+        )
     if any(pole.real == -decay_rate for pole in G.poles):
         raise InputError(
-            f"G has a pole on the line Re s = {0 - decay_rate:g}, on which the norm would be taken; "
-            "expected a decay rate that keeps clear of it"
+            f"G has a pole with Re s = {0 - decay_rate:g}, the line of the decay rate on which the norm is taken; "
+            "expected another decay rate"
         )
     own = [*W1.poles, *shared((W2 * G).poles, G.poles)[1]]
     if own and max(pole.real for pole in own) >= -decay_rate:
         raise InputError(
-            f"a weight has a pole at Re s = {max(pole.real for pole in own):g}; "
-            f"expected all of them left of {0 - decay_rate:g}, minus the decay rate asked for"
+            f"a weight has a pole with Re s = {max(pole.real for pole in own):g}; expected Re s < {0 - decay_rate:g}, "
+            "minus the decay rate, for all of them"
         )
 
 
@@ -254,15 +260,15 @@ def _bisect(problem: Problem) -> Obstacle:
         else:
             gamma = math.sqrt(high * proof.gamma) if high < math.inf else 4 * proof.gamma
         if not 1e-100 < gamma < 1e100:
-            raise SynthesisError(f"the infimum of the norm is beyond {gamma:.0e}; expected weights of another size")
+            raise SynthesisError(f"the infimum of the norm is beyond {gamma:.0e}; expected weights nearer to 1")
         for tried in (gamma, gamma * (1 + NUDGE)):
             answer = is_feasible(problem, tried)
             if answer is not False:
                 break
         else:
             raise SynthesisError(
-                f"rounding hides whether a controller reaches the norm {gamma:.6g}: the weights have roots too near "
-                "each other; expected others"
+                f"rounding errors are too large to decide whether a controller reaches the norm {gamma:.6g}; expected "
+                "weights whose roots lie farther apart"
             )
         proof, high = (answer, high) if isinstance(answer, Obstacle) else (proof, tried)
     return proof

@@ -166,7 +166,8 @@ def _judge(setting: Setting, problem: Problem, gamma: float) -> Obstacle | bool:
         return True
     return Obstacle(
         gamma,
-        f"no stable T meets its {len(points)} conditions: Pick's matrix has a pivot of {pivot:.3g} times its diagonal",
+        f"no stable T meets the {len(points)} interpolation conditions: a pivot of Pick's matrix is {pivot:.3g} times "
+        "the diagonal element",
     )
 
 

@@ -59,7 +59,10 @@ def judged_cells(judge: Judge, edges: Real) -> tuple[Real, Real, Whole]:
     while len(left):
         looked_at += len(left)
         if looked_at > CELLS:
-            raise InputError(f"more than {CELLS} intervals are needed to follow the loop up to {edges[-1]:g} rad/s")
+            raise InputError(
+                f"the loop needs more than {CELLS} intervals up to {edges[-1]:g} rad/s; expected shorter dead times or "
+                "slower roots"
+            )
         centre, half = (left + right) / 2, (right - left) / 2
         code = judge(centre, half)
         code = np.where((code == HALVE) & (half <= NARROW * right + lowest), OPEN, code)

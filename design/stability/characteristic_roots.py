@@ -68,7 +68,7 @@ def rightmost_roots(loop: DelayLoop, count: int) -> CharacteristicRoots:
     argument principle counts right of a line just left of them.
     """
     if count < 1:
-        raise InputError(f"{count} roots were asked for; expected one or more")
+        raise InputError(f"the number of roots is {count}; expected 1 or more")
     if loop.is_predicted:
         roots = np.array(loop.denominator.zeros)
         return _with_hidden(loop, roots, np.zeros(len(roots)), -np.inf)
@@ -85,8 +85,8 @@ def rightmost_roots(loop: DelayLoop, count: int) -> CharacteristicRoots:
                 return _with_hidden(loop, roots[:number], uncertainty[:number], line)
     fastest = max(abs(root) for term in loop.characteristic for root in term.zeros + term.poles)
     raise InputError(
-        f"{ORDERS[-1]} points on a dead time of {longest:g} s do not tell every root where the fastest root of the "
-        f"blocks is at {fastest:g} rad/s; expected shorter dead times"
+        f"{ORDERS[-1]} points on a dead time of {longest:g} s do not resolve every root of the loop, whose blocks have "
+        f"roots up to {fastest:g} rad/s; expected shorter dead times"
     )
 
 
@@ -249,6 +249,11 @@ def _uncertainty(terms: Terms, roots: Complex) -> Real:
         if not np.any(inside):
             return radius
         radius = np.where(inside, 2 * radius, radius)
+
+
+def unstable_roots(count: int) -> str:
+    """``count`` roots in the right half plane, in words."""
+    return f"{count} root{'s' if count > 1 else ''} in the right half plane"
 
 
 def _cut(loop: DelayLoop, roots: Complex, uncertainty: Real, count: int, floor: float) -> tuple[int, float]:

@@ -57,8 +57,8 @@ class DelayLoop:
         for name, (block, least) in (blocks | {"feedback": (self.feedback, 1 if self.feedback.gain else 0)}).items():
             if block.relative_degree < least:
                 raise InputError(
-                    f"{name} has {len(block.zeros)} zeros and {len(block.poles)} poles; expected {least} or more "
-                    "poles more than zeros, or the loop is algebraic"
+                    f"{name} has {len(block.zeros)} zeros and {len(block.poles)} poles; expected at least {least} "
+                    "more poles than zeros, since the loop is algebraic otherwise"
                 )
 
     @property

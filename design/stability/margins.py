@@ -12,7 +12,7 @@ from design.anti_windup.condition import Robustness
 from design.blocks.block import bound_block, plant_block
 from design.design_file import Design
 from design.stability.axis import peak
-from design.stability.characteristic_roots import closing_omega, largest_beyond, roots_right_of
+from design.stability.characteristic_roots import closing_omega, largest_beyond, roots_right_of, unstable_roots
 from design.stability.coprime import Terms
 from design.stability.delay_loop import DelayLoop
 from design.stability.jet import Jet, combined, jet
@@ -146,8 +146,7 @@ def margins_of(loop: DelayLoop, bound: AdditiveBound) -> Margins:
     outside = tuple(root for root in loop.hidden if root.real >= 0)
     unstable = roots_right_of(loop, 0.0) + sum(root.real > 0 for root in outside)
     if unstable:
-        roots = f"{unstable} root{'s' if unstable > 1 else ''} in the right half plane"
-        raise InputError(f"the loop has {roots}; margins are those of a stable loop")
+        raise InputError(f"the loop has {unstable_roots(unstable)}; margins are those of a stable loop")
     axis = AxisLoop(loop)
     omega, rising = magnitude_crossings(axis)
     delays, listed = delay_intervals(axis, omega, rising)

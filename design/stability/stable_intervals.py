@@ -276,8 +276,8 @@ def _intervals(
             counted = count(middle)
             if counted != numbers[k]:
                 raise InputError(
-                    f"with the {name} {middle:g} the argument principle counts {counted} unstable roots and the "
-                    f"crossings of the imaginary axis {numbers[k]}; no margins can be told"
+                    f"with the {name} {middle:g} the argument principle counts {counted} unstable roots, the crossings "
+                    f"of the imaginary axis {numbers[k]}; expected the same number for margins"
                 )
     limits = [
         Margin(0.0, None),

@@ -121,7 +121,7 @@ class CampaignFile:
             self.folder.rmdir()
         if self.folder.exists():
             left = min(path.name for path in self.folder.iterdir())
-            click.echo(f"{self.folder} stays, since it holds {left}, which is no part of the campaign", err=True)
+            click.echo(f"{self.folder} is kept, since it holds {left}, which does not belong to the campaign", err=True)
 
     def _join(self, partial: Path) -> None:
         import pyarrow
@@ -147,7 +147,7 @@ class CampaignFile:
         path = self._parts[number]
         content = read_bytes(path)
         if path.name != _name(number, self._manifest, content):
-            raise InputError(f"{path}: has been changed meanwhile; give the same command to run this part again")
+            raise InputError(f"{path}: was changed during the run; give the same command to run this part again")
         return parquet.read_table(BytesIO(content))
 
     def _parts_of(self, manifest: str) -> dict[int, Path]:
@@ -177,7 +177,7 @@ class CampaignFile:
         except ValueError:
             found = None
         if not isinstance(found, dict):
-            raise InputError(f"{self.folder}: is not the folder of a campaign; expected none, or one to go on with")
+            raise InputError(f"{self.folder}: is not the folder of a campaign; expected one, or no such folder")
         for name, value in self._facts.items():
             if found.get(name) != value and anew:
                 return self._remove_parts(text)
@@ -185,7 +185,7 @@ class CampaignFile:
                 there, here = _said(found.get(name), value), _said(value, found.get(name))
                 raise InputError(
                     f"{self.folder}: holds the parts of another campaign, {name} {there} and not {here}; "
-                    "give the same command to go on with it, or --anew to remove them"
+                    "give the same command as then to continue it, or --anew to remove them"
                 )
         return None
 

@@ -42,7 +42,7 @@ plant_options = together(
     type=int,
     help=(
         "Length of a run in periods of the reference. Default: 5, or as many as the loop needs to "
-        "settle; half as many again where a run settles later than its poles say."
+        "settle; 1.5 times that where a run settles later than its poles say."
     ),
 )
 @sinusoid_options
@@ -58,9 +58,10 @@ def campaign_command(
     periods: int | None,
     **reference: Any,
 ) -> None:
-    """Run DESIGN with plants drawn inside W_a: three rows a plant, none, thesis and corrected.
+    """Run DESIGN with plants drawn within W_a.
 
-    Interrupted, the same command goes on from what is done.
+    The file has three rows for each plant: none, thesis and corrected. After an interruption the same command
+    continues with the plants that are left.
     """
     from design.design_file import read_design
     from experiments.asked_reference import sinusoids

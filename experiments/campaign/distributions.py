@@ -150,9 +150,7 @@ def _require_sealed(path: Path) -> None:
             seal.update(batch)
         said = (file.schema_arrow.metadata or {}).get(SEAL.encode(), b"").decode()
     if said != str(seal):
-        raise InputError(
-            f"{path}: is not as it was written, by its {SEAL}; expected the file of a campaign, run it again"
-        )
+        raise InputError(f"{path}: was changed after the campaign, as its {SEAL} shows; expected an unchanged file")
 
 
 def _read(path: Path) -> Iterator[Columns]:
@@ -184,7 +182,9 @@ def _checked(path: Path, piece: Columns) -> Columns:
         wrong = (values < 0) | (np.isinf(values) & ~piece["diverged"] & (name != "recovery_s"))
         if wrong.any():
             plant, given = piece["plant"][wrong][0], piece[name][wrong][0]
-            raise InputError(f"{path}: {name} of plant {plant} is {given:g}; expected a number, or a run that diverges")
+            raise InputError(
+                f"{path}: {name} of plant {plant} is {given:g}; expected 0 or more, or a run that diverges"
+            )
         measured[name] = np.where(piece["diverged"], np.inf, values)
     return piece | measured | {"run": run}
 
@@ -218,7 +218,7 @@ def _count(path: Path, plants: int) -> tuple[np.ndarray, np.ndarray, np.ndarray,
         if found != plants:
             raise InputError(f"{path}: {found} rows with anti_windup {name}; expected one for each of {plants} plants")
     if (sectors[0] != sectors[1]).any():
-        raise InputError(f"{path}: the guaranteed_sector of one anti_windup differs; expected one of each")
+        raise InputError(f"{path}: an anti_windup has several values of guaranteed_sector; expected one")
     return counts, np.where(np.isfinite(peaks), peaks, np.nan), sectors[1], [int(-plant) for _, _, plant in worst]
 
 

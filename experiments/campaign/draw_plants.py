@@ -108,8 +108,8 @@ class PlantsWithin:
         self._units = np.where(alone > SMALLEST * self._most, alone, 0.0)
         if not self._units.any():
             raise InputError(
-                "no plant but the model itself is within the additive bound: the bound falls faster than the plant as "
-                "omega grows; expected a bound that covers the plant's own size there"
+                "only the model itself is within the additive bound, which falls faster than |P| as omega grows; "
+                "expected a bound that does not"
             )
 
     def draw(self, seed: int, index: int) -> Member:
@@ -160,9 +160,8 @@ class PlantsWithin:
             t *= 1 - shrink
             shrink = min(10 * shrink, MOST_SHRINK)
         raise InputError(
-            "no plant within W_a was found beside the model in a direction that was drawn, so that no plants are drawn "
-            "at all; expected a W_a that leaves room: of a fit with another --bound-order, --bound-below or "
-            "--bound-above"
+            "no plant other than the model was found within W_a; expected a larger W_a, as from a fit with another "
+            "--bound-order, --bound-below or --bound-above"
         )
 
     def _resolved(self, omega: np.ndarray) -> np.ndarray:

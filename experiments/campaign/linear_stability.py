@@ -101,11 +101,11 @@ class PerturbedLoop:
         """
         same_gain = true.integrators <= 0 or true.gain == self.plant.gain
         if true.integrators != self.plant.integrators or not same_gain:
-            raise InputError("the true plant's integrators differ from the model's; expected the same, gain and all")
+            raise InputError("the true plant's integrators differ from the model's; expected the same number and gain")
         if len(true.unstable_poles) != len(self.plant.unstable_poles):
             raise InputError(
                 f"the true plant has {len(true.unstable_poles)} poles in the right half plane, the model "
-                f"{len(self.plant.unstable_poles)}; expected as many"
+                f"{len(self.plant.unstable_poles)}; expected equal numbers"
             )
         modes = [*true.zero_modes, *true.pole_modes]
         around = [mode.omega * np.exp(min(abs(mode.zeta), 0.1) * AROUND) for mode in modes]
@@ -124,7 +124,7 @@ class PerturbedLoop:
                 return _turns(f)
             if np.any(np.diff(omega)[wide] < CLOSEST * omega[wide]):
                 place = f"{omega[wide[0]]:.6g} rad/s"
-                raise InputError(f"a root of the loop is on the imaginary axis near {place}, as far as rounding shows")
+                raise InputError(f"a root of the loop is on the imaginary axis near {place}, within rounding errors")
             middle = (omega[wide] + omega[wide + 1]) / 2
             omega = np.insert(omega, wide + 1, middle)
             L = np.insert(L, wide + 1, self._deviation(true, middle))

@@ -100,9 +100,9 @@ def _complete(file: CampaignFile, campaign: Campaign, plants: int, scheduler: st
                     left -= chunk[1] - chunk[0]
                     bar.update(chunk[1] - chunk[0])
                     kept = f"{plants - left} of {plants} plants are kept in {file.folder}"
-                    process.leaves(f"{kept}; the same command goes on")
+                    process.leaves(f"{kept}; the same command continues")
         except WorkersLostError as error:
-            raise InputError(f"{error}; the same command goes on from what is done") from None
+            raise InputError(f"{error}; the same command continues from there") from None
         finally:
             done.close()
     file.finish()
@@ -116,7 +116,7 @@ def _promised(summary: pd.DataFrame) -> str:
         f"{row['covered']:.2%} of its runs"
         for row in summary[summary["guaranteed_sector"] > 0].to_dict("records")
     ]
-    return f"Of all plants within W_a {'; '.join(said)}" if said else "No guarantee speaks of all plants within W_a"
+    return f"Of all plants within W_a {'; '.join(said)}" if said else "No guarantee holds for all plants within W_a"
 
 
 def _lines(summary: pd.DataFrame) -> list[str]:

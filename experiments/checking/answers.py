@@ -27,7 +27,7 @@ class Outcome(Enum):
     OUTSIDE = "OUTSIDE"
     MOVED = "MOVED"
     LOST = "LOST"
-    OPEN = "not told"
+    OPEN = "unknown"
 
     @property
     def fails(self) -> bool:
@@ -115,11 +115,11 @@ def _bound(found: ModelCheck, looked: Sequence[Reach], beyond_fit: Reach, parame
     if not tests_differ(record) or parameters is Outcome.MOVED:
         return Outcome.MOVED, left
     if beyond_fit.chance < share:
-        line = f"the line at {_hertz(beyond_fit.omega)} is none of a plant with the model's structure"
+        line = f"no plant with the model's structure meets the line at {_hertz(beyond_fit.omega)}"
         return Outcome.MOVED, f"{left}; {line}"
     many = f"the model's own {len(record.tests)} tests differ by more than noise"
     if parameters is Outcome.OPEN:
-        return Outcome.OUTSIDE, f"{left}; {many}, too much to tell whether the plant moved"
+        return Outcome.OUTSIDE, f"{left}; {many}, too much to show whether the plant moved"
     return (
         Outcome.OUTSIDE,
         f"{left}; {many}, and another test of the same plant may differ as much: nothing shows that the plant moved",
@@ -154,7 +154,7 @@ def _parameters(found: ModelCheck, sweep: SweepCheck) -> tuple[Outcome, str]:
     untold = sum(not move.could_be_told for move in sweep.moves)
     new = ""
     if sweep.new_at is not None:
-        new = f"the sweep shows what the model's structure does not have, near {_hertz(sweep.new_at)}"
+        new = f"the sweep shows dynamics that the model's structure lacks, near {_hertz(sweep.new_at)}"
     if moved:
         words = ", ".join([f"{named(moved[0].parameter)} moved {_by(moved[0])}", *map(_also, moved[1:NAMED])])
         words += f", and {len(moved) - NAMED} more" if len(moved) > NAMED else ""
@@ -162,7 +162,7 @@ def _parameters(found: ModelCheck, sweep: SweepCheck) -> tuple[Outcome, str]:
     if untold == len(sweep.moves) and not new:
         return (
             Outcome.OPEN,
-            "the model's tests differ too much, or the sweep is too noisy, to tell a move of any parameter",
+            "the model's tests differ too much, or the sweep is too noisy, to detect a move of any parameter",
         )
     first, open_moves = largest[0], [move for move in largest if move.is_open]
     if open_moves and not new:
@@ -170,11 +170,11 @@ def _parameters(found: ModelCheck, sweep: SweepCheck) -> tuple[Outcome, str]:
             f"{named(move.parameter)} differs {_by(move)}, and {_least(move)}" for move in open_moves[:NAMED]
         )
         tests = f"{len(record.tests)} test{'s are' if len(record.tests) > 1 else ' is'}"
-        return Outcome.OPEN, f"{tests} too few to tell whether a parameter moved: {words}"
+        return Outcome.OPEN, f"{tests} too few to show whether a parameter moved: {words}"
     none = "no parameter moved by more than chance"
     none += f"; {named(first.parameter)}, which differs {_by(first)}, comes nearest to a move"
     none += f" ({_least(first)})" if first.could_be_told else ""
-    rest = [f"of {untold} of the {len(sweep.moves)} parameters no move could be told"] if untold else []
+    rest = [f"no move of {untold} of the {len(sweep.moves)} parameters can be detected"] if untold else []
     return Outcome.MOVED if new else Outcome.HOLDS, "; ".join([*([new] if new else []), none, *rest])
 
 
@@ -212,8 +212,8 @@ def found_from(move: Move) -> str:
 
 def _least(move: Move) -> str:
     if not move.could_be_told:
-        return "no move of it could be told"
-    return f"only a move of {found_from(move)} or more could be told"
+        return "no move of it can be detected"
+    return f"only a move of {found_from(move)} or more can be detected"
 
 
 def _also(move: Move) -> str:
@@ -223,7 +223,7 @@ def _also(move: Move) -> str:
 def _margins(promised: Promise, on_plant: OnPlant, is_within: bool) -> tuple[Outcome, str]:
     before, after = promised.margins, on_plant.margins
     if not isinstance(before, Margins):
-        return Outcome.OPEN, f"the design has none with its own model: {before}"
+        return Outcome.OPEN, f"the design has no margins with its own model: {before}"
     if not isinstance(after, Margins):
         return Outcome.LOST, f"the loop is NOT stable with the new plant ({after})"
     new, old = _digits(after.modulus.value, 3), _digits(before.modulus.value, 3)
@@ -233,7 +233,7 @@ def _margins(promised: Promise, on_plant: OnPlant, is_within: bool) -> tuple[Out
         least = f"less than the {least} that the design promises {to_whom}"
         return Outcome.LOST, f"the loop is stable, but its modulus margin is {new}, {least}; with the model it is {old}"
     said = f"its modulus margin is {new}, {'as with the model' if new == old else f'and {old} with the model'}"
-    robust = f"as |W_a C S| reaches {before.W_a_C_S.value:.3g}, the design promises no plant within W_a a margin"
+    robust = f"|W_a C S| reaches {before.W_a_C_S.value:.3g}, so the design promises no margin within W_a"
     if promised.modulus:
         robust = f"the design promises at least {promised.modulus:.3g} {to_whom}"
     return Outcome.HOLDS, f"the loop is stable, and {said}; {robust}"
@@ -243,7 +243,7 @@ def _guarantee(promised: Promise, on_plant: OnPlant) -> tuple[Outcome, str]:
     if promised.missing:
         return Outcome.OPEN, f"the design guarantees nothing: {promised.missing}"
     if on_plant.sector is None:
-        return Outcome.LOST, "nothing is guaranteed of a loop that is not stable"
+        return Outcome.LOST, "an unstable loop has no guarantee"
     found, asked = _told(on_plant.sector, promised.sector, sector_text)
     if on_plant.sector < (1 - ROUNDING) * promised.sector:
         lost = f"the circle criterion gives the sector {found}, less than the {asked} that is promised"

@@ -63,7 +63,7 @@ def require_of_model(design: Design, model: IdentifiedModel) -> None:
     if design.plant == model.plant and design.additive_bound == model.additive_bound:
         return
     which = "plant" if design.plant != model.plant else "W_a"
-    raise InputError(f"the design is of another model, its {which} is not the model's; expected a design of this model")
+    raise InputError(f"the design's {which} is not that of the model; expected a design of this model")
 
 
 def promise(design: Design) -> Promise:

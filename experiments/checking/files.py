@@ -15,7 +15,7 @@ SUITE = "antiwindup check"
 
 
 def junit(found: ModelCheck) -> str:
-    """A test case for each question about each sweep: what does not hold is a failure, what is not told is skipped."""
+    """A test case for each question about each sweep: what does not hold is a failure, what is unknown is skipped."""
     given = answers(found)
     counts = {
         "tests": len(given),

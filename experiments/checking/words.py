@@ -25,10 +25,10 @@ def first_sentence(found: ModelCheck) -> str:
     held = {each.question for each in given if each.outcome is Outcome.HOLDS} - failed.keys()
     if not failed:
         reasons = ["every sweep lies within W_a" if len(found.sweeps) > 1 else "the sweep lies within W_a"]
-        reasons[0] += " but for noise" if any(map(_is_beyond, found.sweeps)) else ""
+        reasons[0] += " except for noise" if any(map(_is_beyond, found.sweeps)) else ""
         reasons += ["no parameter moved by more than chance"] if "parameters" in held else []
         untold = dict.fromkeys(each.question for each in given if each.outcome is Outcome.OPEN)
-        rest = f"; not told: {', '.join(untold)}" if untold else ""
+        rest = f"; unknown: {', '.join(untold)}" if untold else ""
         return f"Nothing to do: {', '.join([*reasons, *_design_keeps(held)])}{rest}"
     outcomes = {each.outcome for each in given}
     todo = "Fit a new model"
@@ -41,7 +41,7 @@ def first_sentence(found: ModelCheck) -> str:
     after = _design_keeps(held)
     if Outcome.MOVED in outcomes and found.model.fit is not None and len(found.model.fit.tests) == 1:
         after += ["the model's single test does not say how much tests of one plant differ"]
-    after += ["--against DESIGN tells whether a design may stay"] if found.promise is None else []
+    after += ["--against DESIGN shows whether a design can stay"] if found.promise is None else []
     return f"{todo}: {'; '.join([*failed.values(), *after])}"
 
 

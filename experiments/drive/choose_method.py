@@ -47,10 +47,10 @@ class LeastRate:
         """From which rate on the loop is stable, as far as it was tried."""
         low, high = self.searched_hz
         if not math.isfinite(self.stable_hz):
-            return f"{self.method}: at no rate of those tried, {low:.4g} to {high:.4g} Hz"
+            return f"{self.method}: none from {low:.4g} to {high:.4g} Hz"
         if not self.unstable_hz:
-            return f"{self.method}: at every rate tried, {low:.4g} to {high:.4g} Hz"
-        return f"{self.method}: from {self.stable_hz:.4g} Hz on, as far as rates up to {high:.4g} Hz were tried"
+            return f"{self.method}: all from {low:.4g} to {high:.4g} Hz"
+        return f"{self.method}: all from {self.stable_hz:.4g} to {high:.4g} Hz"
 
 
 def judge_methods(
@@ -158,5 +158,5 @@ def choose_method(
     if not first.stable:
         sought = [first] if found[0].stable else [each for each in found if not each.refused]
         searched = (str(least_rate(design, replace(drive, method=each.method), plant, form)) for each in sought)
-        said += f". It is stable with {'; '.join(searched)}"
+        said += f". Rates that were tried and leave it stable: {'; '.join(searched)}"
     return first, said

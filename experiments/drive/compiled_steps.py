@@ -201,7 +201,7 @@ def run(
     low, high, slew = actuator.low, actuator.high, actuator.slew
     limit = max(abs(low) if np.isfinite(low) else 0.0, abs(high) if np.isfinite(high) else 0.0)
     most_u, most_x = (MOST * limit, ENORMOUS) if limit > 0 else (MOST, MOST)
-    knot = 0
+    knot = int(np.int64(0))  # not literal, for which numba would compile _move_disturbed once more
     for k in range(-early, 0):
         knot = _move_disturbed(plant, x, term, following, 0.0, 0.0, slew, 0.0, read, k * T, knot)
         if 0 <= k + late + 1 < s:

@@ -108,7 +108,7 @@ def sample_block(system: StateSpace, delays_s: Sequence[float], sample_time_s: f
         return SampledBlock(
             A=np.linalg.solve(np.eye(n) - half, np.eye(n) + half),
             b=b,
-            C=np.linalg.solve((np.eye(n) - half).T, system.C.T).T,
+            C=np.ascontiguousarray(np.linalg.solve((np.eye(n) - half).T, system.C.T).T),
             d=system.d + system.C @ b / 2,
             first=whole,
             length=np.where(rest > 0, 2, 1),

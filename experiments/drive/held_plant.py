@@ -46,7 +46,7 @@ def held_plant(plant: PlantModel, sample_time_s: float, more_delay_s: float = 0.
     Raises
     ------
     InputError
-        Its zeros are not told from each other.
+        Two of its zeros are too close to separate.
 
     Notes
     -----
@@ -79,7 +79,7 @@ def held_plant(plant: PlantModel, sample_time_s: float, more_delay_s: float = 0.
     found = decided(numerator) if n else Block(float(P.d[0]))
     if found is None:
         raise InputError(
-            f"the zeros of the plant with a held input are not told from each other at {1 / sample_time_s:g} Hz; "
+            f"the zeros of the plant with a held input are too close to separate at {1 / sample_time_s:g} Hz; "
             "expected another rate"
         )
     poles = tuple(image(pole, sample_time_s) for pole in plant_block(plant).poles)

@@ -51,7 +51,7 @@ def matched_controller(
     ------
     InputError
         The design is another; or the rate is not above twice the reference's highest frequency, or so low that
-        numbers are not told from rounding.
+        numbers are lost in rounding errors.
 
     Notes
     -----
@@ -67,17 +67,18 @@ def matched_controller(
     T, fastest = sample_time_s, max(design.reference_omegas)
     if not is_matched(design):
         raise InputError(
-            "the method matched is for an extended design with the exact inverse of the plant; expected tustin or exact"
+            "the method is 'matched', for an extended design with the exact inverse of the plant; expected 'tustin' or "
+            "'exact' for this one"
         )
     if not fastest * T < np.pi:
         raise InputError(
-            f"the rate is {1 / T:g} Hz and the reference has {fastest / (2 * np.pi):.6g} Hz; expected more than twice "
-            "that"
+            f"the rate is {1 / T:.9g} Hz and the reference has {fastest / (2 * np.pi):.9g} Hz; expected more than "
+            "twice the reference's frequency"
         )
     P_d, samples = held_plant(design.plant, T)
     K_d = decided(lambda: _forward(design, P_d, samples, T))
     if K_d is None:
-        raise InputError(f"the controller is not told from rounding at {1 / T:g} Hz; expected another rate")
+        raise InputError(f"rounding errors exceed the controller at {1 / T:g} Hz; expected another rate")
     T_d = K_d * P_d
     if form == "thesis":
         forward, feedback = K_d, _sampled(realize(T_d), [samples], T)
@@ -97,7 +98,7 @@ def is_matched(design: Design) -> bool:
 
 
 def _forward(design: Design, P_d: Block, samples: int, T: float) -> Block:
-    """K_d in w; raises UndecidedError where the zeros of n_d are not told apart."""
+    """K_d in w; raises UndecidedError where two zeros of n_d are too close to separate."""
     T_so, (T_si, P_o) = design.blocks["T_so"], inner_outer(design.plant)
     integral_action = bool(abs(1 - (T_so * T_si)(0)) < FOLLOWS)
     wanted = tracking_conditions(design.plant, design.reference_omegas, integral_action)

@@ -74,13 +74,13 @@ class Drive:
         if self.method not in METHODS:
             raise InputError(f"the method is '{self.method}'; expected {', '.join(METHODS[:-1])} or {METHODS[-1]}")
         if not 0 <= self.quantum < math.inf:
-            raise InputError(f"the quantum is {self.quantum:g}; expected a number that is not negative, 0 for none")
+            raise InputError(f"the quantum is {self.quantum:g}; expected 0 for none, or a positive number")
         if not self.rate_limit > 0:
             raise InputError(
                 f"the rate limit is {self.rate_limit:g} a second; expected a positive number, inf for no limit"
             )
         if not 0 <= self.input_delay_s < math.inf:
-            raise InputError(f"the input delay is {self.input_delay_s:g} s; expected a number that is not negative")
+            raise InputError(f"the input delay is {self.input_delay_s:g} s; expected 0 or a positive number")
         if not 0 <= self.resolution < math.inf:
             raise InputError(f"the resolution is {self.resolution:g}; expected 0 or a positive number")
         largest = max((abs(end) for end in self.limits if math.isfinite(end)), default=0.0)
@@ -253,7 +253,7 @@ def controller_blocks(
     if fastest and not fastest / FAR <= drive.rate_hz <= fastest * FAR:
         raise InputError(
             f"the rate is {drive.rate_hz:g} Hz, and the loop's fastest root {fastest:.3g} rad/s; expected a rate "
-            "nearer to it"
+            f"from {fastest / FAR:.3g} to {fastest * FAR:.3g} Hz"
         )
     if drive.method == "matched":
         forward, feedback, theta = matched_controller(design, anti_windup, 1 / drive.rate_hz, form)
@@ -262,7 +262,7 @@ def controller_blocks(
     around = float(feedback.at_once.sum())
     if not (around < 1 and 1 + theta.d[0] + forward.d[0] * theta.at_once[1] / (1 - around) > 0):
         raise InputError(
-            f"at {drive.rate_hz:g} Hz the method {drive.method} leaves the controller an algebraic loop without one "
+            f"at {drive.rate_hz:g} Hz the method {drive.method} gives the controller an algebraic loop without one "
             "solution; expected a higher rate, or another method"
         )
     return forward, feedback, theta, around

@@ -71,7 +71,7 @@ def compile_loop(
     """
     now, direct = loop.delays == 0, _direct(loop)
     if np.any(loop.E[now] @ direct[now] != 0):
-        raise InputError("the control reaches itself at once, an algebraic loop; expected a dead time between")
+        raise InputError("the control depends on itself without delay, an algebraic loop; expected a dead time in it")
     A, C = loop.A + loop.D[:, now] @ loop.Z[now], loop.C + loop.E[now] @ loop.Z[now]
     of_m, of_now, of_u = (loop.D[:, now] @ direct[now]).T
     A, B, by_u = A + np.outer(of_u, C), loop.B + of_m + of_now, np.outer(of_u, loop.E)

@@ -89,9 +89,9 @@ def first_exit(g: Array, length: float) -> float:
                 b[j] = 0.5 * (b[j] + b[j + 1])
         # de Casteljau leaves the second half in b
         middle = 0.5 * (lo + hi)
-        stack[depth] = b
+        for j in range(n + 1):
+            stack[depth, j], stack[depth + 1, j] = b[j], first[j]
         left[depth], right[depth] = middle, hi
-        stack[depth + 1] = first
         left[depth + 1], right[depth + 1] = lo, middle
         depth += 2
     return -1.0

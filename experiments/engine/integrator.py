@@ -70,37 +70,42 @@ def integrate(
     events, modes, event_count = np.empty(bounds.events), np.empty(bounds.events, np.int64), 0
     places = np.empty(bounds.events)
 
+    # not literal, and loops instead of arrays' sums: numba would compile several seconds longer
+    pieces = queued = on_limit = roots = usual = int(np.int64(0))
     # the sources of the delayed signals, one polynomial a step, the step p at p % room, and where each dead time reads
-    starts, lates, radii, degrees, pieces = np.empty(room), np.empty(room), np.empty(room), np.empty(room, np.int64), 0
+    starts, lates, radii, degrees = np.empty(room), np.empty(room), np.empty(room), np.empty(room, np.int64)
     history = np.empty((room, k, most + 1))
     wrap = room - 1
     cursor, filled = np.zeros(k, np.int64), np.zeros(k, np.int64)
-    queue, queued = np.empty(room), 0  # mesh points to come: the images of kinks
+    queue = np.empty(room)  # mesh points to come: the images of kinks
 
     z, P, W = np.zeros(increments.shape[2]), np.zeros((signals, most + 1)), np.zeros(most + 1)
     sizes, terms, later, negligible = np.zeros(len(z)), np.zeros(n), np.zeros(n), np.zeros(1 + k)
     work = np.zeros((2, most + 1))
     U, V = P[0], np.zeros((most + 1, n + 1 + k))
-    V[0, :n], V[0, n] = x0, min(max(0.0, low), high)
-    rest = np.array([times(indptr, indices, data, saturated + n + 1 + j, V, 0) for j in range(k)])
+    x, scale, rest, size, last = np.zeros(n), np.zeros(n), np.zeros(k), np.zeros(signals), np.zeros(1 + k)
+    for r in range(n):
+        V[0, r], x[r], scale[r] = x0[r], x0[r], abs(x0[r])
+    V[0, n] = min(max(0.0, low), high)
+    for j in range(k):
+        rest[j] = times(indptr, indices, data, saturated + n + 1 + j, V, 0)
+        size[1 + j] = abs(rest[j])
+    for j in range(k):
+        V[0, n + 1 + j] = rest[j]
     remembered = Past(starts, lates, degrees, history, rest, queue)
-    V[0, n + 1 :] = rest
-    x, scale, size = x0.copy(), np.abs(x0), np.zeros(signals)
-    size[1 : 1 + k] = np.abs(rest)
-    last = np.zeros(1 + k)
     tops, unfolded = np.zeros(signals, np.int64), np.zeros(signals, np.int64)  # degrees, and in which step
     taus, found = np.zeros(AT_ONCE), np.zeros(AT_ONCE)
     u = times(indptr, indices, data, saturated + n, V, 0)
     mode = 0 if slews else (1 if u > high else (-1 if u < low else 0))
-    kink, on_limit, roots, standing = True, 0, 0, 0
-    level, longest = 0, brief.max() if len(brief) > 0 else 0.0
+    kink, standing = True, 0
+    level, longest = 0, brief[-1] if len(brief) > 0 else 0.0
     for g in range(len(samples)):
         while sample[g] < samples.shape[1] and samples[g, sample[g]] < 0:
             for o in range(groups[g], groups[g + 1]):
                 values[1 + o, sample[g]] = times(indptr, indices, data, saturated + n + reads[o], V, 0)
             sample[g] += 1
     V[0, n] = 0.0
-    t, late, reset, status, steps, usual = 0.0, 0.0, 0, endings.COMPLETE, 0, 0  # the time is t + late, lest it drifts
+    t, late, reset, status, steps = 0.0, 0.0, 0, endings.COMPLETE, 0  # the time is t + late, lest it drifts
 
     while t < horizon:
         if steps == bounds.steps:
@@ -229,7 +234,8 @@ def integrate(
             for i in range(known + 1):
                 for j in range(k):
                     V[i, n + 1 + j] = z[n + 1 + k * i + j]
-            V[0, : n + 1] = z[: n + 1]
+            for c in range(n + 1):
+                V[0, c] = z[c]
             matter = driven(z, n, filled, size, reach)
             first = which * (n + signals)
             advance(rows, first, tables.influence[which, signals:], V, n, matter, most, scale, step, reach, x)

@@ -87,7 +87,7 @@ def limit_pair(limits: float | Sequence[float]) -> tuple[float, float]:
         )
     low, high = (-float(pair[0]), float(pair[0])) if pair.size == 1 else (float(pair[0]), float(pair[1]))
     if not low < high:
-        raise InputError(f"the saturation limits are {low:g} and {high:g}; expected the lower one first")
+        raise InputError(f"the saturation limits are {low:.12g} and {high:.12g}; expected the lower one first")
     return low, high
 
 
@@ -219,13 +219,13 @@ def _require_affordable(compiled: CompiledLoop, room: int, horizon: float) -> No
     step = compiled.step
     shortest = float(compiled.delays[~np.isin(compiled.delays, compiled.brief)].min(initial=math.inf))
     asked = (
-        f"the shortest dead time, {shortest:.3g} s, asks for"
+        f"the shortest dead time, {shortest:.3g} s, needs"
         if step > shortest / 2
-        else (f"a root of the loop near {FURTHEST / step:.3g} rad/s asks for")
+        else (f"a root of the loop near {FURTHEST / step:.3g} rad/s needs")
     )
     if room * compiled.tables.increments.shape[2] > MOST_ROOM:
         raise InputError(
-            f"{asked} steps of {step:.3g} s, too many to remember in the longest dead time, "
+            f"{asked} steps of {step:.3g} s, too many to store for the longest dead time, "
             f"{compiled.delays.max():.3g} s; expected dead times that differ less, or a slower design"
         )
     if horizon / step > MOST_STEPS:

@@ -154,21 +154,28 @@ def tabulate(rows: Rows, n: int, k: int, step: float) -> tuple[Tables, int]:
                         outputs[p, s, c] += value * responses[p, column, c]
                 elif p == 0:
                     outputs[p, s, column] += value
+    # loops, since numba takes seconds to compile what adds arrays
     for p in range(1, degree + 1):
-        influence[:signals] += np.abs(outputs[p, :, :n])
-    polynomials, terms = _laid_out(outputs, degree, n, k), _laid_out(responses[:, :n], degree, n, k)
+        for s in range(signals):
+            for c in range(n):
+                influence[s, c] += abs(outputs[p, s, c])
+    polynomials, terms = _laid_out(outputs, signals, degree, n, k), _laid_out(responses, n, degree, n, k)
     increments, magnitudes = np.zeros((n, terms.shape[1])), np.zeros((signals, terms.shape[1]))
     for p in range(degree, -1, -1):  # the small terms first
-        magnitudes += np.abs(polynomials[signals * p : signals * (p + 1)])
-        if p > 0:
-            increments += terms[n * p : n * (p + 1)]
+        for c in range(terms.shape[1]):
+            for s in range(signals):
+                magnitudes[s, c] += abs(polynomials[signals * p + s, c])
+            for r in range(n if p > 0 else 0):
+                increments[r, c] += terms[n * p + r, c]
     return Tables(increments, polynomials, terms, magnitudes, influence), degree
 
 
 @njit(nogil=True)
-def _laid_out(responses: Array, degree: int, n: int, k: int) -> Array:
-    """Responses (p, rows, n + 1 + k) to x_0, m and w_0 as rows over z, by degree; w_i has its i degrees later."""
-    rows = responses.shape[1]
+def _laid_out(responses: Array, rows: int, degree: int, n: int, k: int) -> Array:
+    """Of responses (p, ., n + 1 + k) to x_0, m and w_0 the first ``rows``, as rows over z, by degree.
+
+    w_i has its i degrees later.
+    """
     table = np.zeros((rows * (degree + 1), n + 1 + k * (degree + 1)))
     for p in range(degree + 1):
         for r in range(rows):
@@ -189,13 +196,15 @@ def _ends(terms: Array, influence: Array, largest: Array, p: int) -> bool:
     """
     n, columns = largest.shape
     for r in range(n):
+        total = 0.0
         for c in range(columns):
             bound = 0.0
             for i in range(n):
                 bound += influence[r, i] * abs(terms[i, c])
             if 2 * bound > ROUNDING * (p + 1) * largest[r, c]:
                 return False
-        if np.abs(terms[r, :n]).sum() > 0.5:
+            total += abs(terms[r, c]) if c < n else 0.0
+        if total > 0.5:
             return False
     return True
 

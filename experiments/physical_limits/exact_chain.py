@@ -169,7 +169,9 @@ def _exponential(generator: np.ndarray) -> np.ndarray:
     """exp by its series in integers, to the last bit: some 300 rounded products, each amplified by exp(64) at most."""
     norm = float(np.abs(_rounded(generator)).sum(axis=1).max())
     if norm > LARGEST:
-        raise InputError(f"the plant's states change {norm:.3g} times themselves in a cell; expected a slower plant")
+        raise InputError(
+            f"the plant's states change by up to {norm:.3g} times their size in a cell; expected slower poles"
+        )
     term = total = _integers([[Fraction(int(i == k)) for k in range(len(generator))] for i in range(len(generator))])
     k = 0
     while np.abs(term).max() > 1:

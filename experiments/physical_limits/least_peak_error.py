@@ -217,21 +217,20 @@ def harmonic(plant: PlantModel, reference: Reference) -> Reference:
     if plant.unstable_poles:
         fastest = max(pole.real for pole in plant.unstable_poles)
         raise InputError(
-            f"the plant has a pole in the right half plane, of real part {fastest:.4g} rad/s; expected none, since no "
-            "bound here holds for states that grow"
+            f"the plant has a pole in the right half plane, of real part {fastest:.4g} rad/s; expected none, since the "
+            "bounds do not hold for states that grow"
         )
     if not (plant.pole_modes or plant.real_poles or plant.integrators > 0):
         raise InputError(
-            f"the plant is the gain {plant.gain:.4g}, whose least error is that by which r leaves so many times the "
-            "limits; expected a plant with a pole"
+            f"the plant is a constant gain of {plant.gain:.4g}, whose least error is |r| less that gain times the "
+            "limit; expected a plant with a pole"
         )
     if reference.slope:
         raise InputError(f"the reference has the slope {reference.slope:g} a second; expected a periodic one")
     if not any(reference.omegas):
         raise InputError(
-            f"the reference is a constant alone, which has no period over which an error is bounded: limits that hold "
-            f"its steady control, of size {reference.required(plant).value:.6g}, allow that no error lasts; expected a "
-            "frequency above 0 rad/s too"
+            "the reference is a constant, which has no period, and no error lasts if the limits exceed its steady "
+            f"control of {reference.required(plant).value:.6g}; expected a frequency above 0 rad/s too"
         )
     slowest = min(omega for omega in reference.omegas if omega > 0)
     harmonics = [round(omega / slowest) for omega in reference.omegas]
@@ -249,7 +248,6 @@ def finite_limits(plant: PlantModel, limits: float | Sequence[float]) -> tuple[f
         raise InputError(f"the saturation limits are {low:g} and {high:g}; expected finite ones")
     if plant.integrators > 0 and not low < 0 < high:
         raise InputError(
-            f"the saturation limits are {low:g} and {high:g}, between which a plant with an integrator drifts; "
-            "expected 0 between them"
+            f"the saturation limits are {low:g} and {high:g}; expected 0 between them for a plant with an integrator"
         )
     return low, high

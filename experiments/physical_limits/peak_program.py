@@ -63,8 +63,8 @@ class PeakProgram:
     def __post_init__(self) -> None:
         if self.fineness * self.steps > MOST_CELLS:
             raise InputError(
-                f"the plant's fastest pole, {self._fastest:.4g} rad/s, is too fast beside {float(self.span_s):.4g} s "
-                f"of reference; expected at most {MOST_CELLS * PHASE / float(self.span_s):.3g} rad/s"
+                f"the plant's fastest pole, {self._fastest:.4g} rad/s, is too fast for {float(self.span_s):.4g} s of "
+                f"the reference; expected at most {MOST_CELLS * PHASE / float(self.span_s):.3g} rad/s"
             )
 
     @property

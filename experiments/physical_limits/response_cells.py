@@ -165,9 +165,7 @@ class Cells:
         rounded = self._roundings * (np.abs(step) @ sizes[:-1]).sum(axis=2).max(axis=1)
         s = float((rounded + error * norms[:-1]).sum()) * SPARE + len(powers) * TINY
         if not s < 0.5:
-            raise InputError(
-                "the plant turns too often in the span for a bound; expected slower poles or a shorter span"
-            )
+            raise InputError("the plant oscillates too often in the span; expected slower poles or a shorter span")
         return s * float(norms.max()) / (1 - s) * SPARE
 
     @cached_property
@@ -195,8 +193,8 @@ class Cells:
         doubt += _norm(inverse) * (error + self._roundings * (1 + _norm(lacking))) * SPARE
         if not doubt < 0.5:
             raise InputError(
-                "a pole of the plant is too slow beside the period for a bound; expected one that decays by more than "
-                "1e-9 of itself in a period, or a pole at zero"
+                "a pole of the plant is too slow; expected one that decays by more than 1e-9 of itself in a period, or "
+                "a pole at zero"
             )
         return np.asarray(np.abs(inverse) + _norm(inverse) * doubt / (1 - doubt))
 
@@ -230,7 +228,8 @@ def driven(flow: np.ndarray, inputs: np.ndarray, first: np.ndarray) -> np.ndarra
     """x_0 = ``first``, x_{k+1} = flow x_k + inputs_k, shape (count + 1, n), for ``inputs`` of the shape (count, n)."""
     count, n = inputs.shape
     x = np.empty((count + 1, n))
-    x[0] = first
+    for i in range(n):
+        x[0, i] = first[i]
     for k in range(count):
         for i in range(n):
             total = inputs[k, i]

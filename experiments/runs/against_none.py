@@ -175,7 +175,7 @@ def _length(design: Design, reference: Reference) -> tuple[float, float]:
     until = min(max(PERIODS * period, 3 * recovery), most, longest_run(design.loop_plant))
     if until < period:
         why = "the plant's unstable pole" if until < most else "the loop's fastest root"
-        raise InputError(f"a period of the reference is {period:.4g} s, and {why} lets a run last {until:.4g} s")
+        raise InputError(f"the period is {period:.6g} s; expected at most {until:.6g} s, to which {why} limits a run")
     return until, period
 
 

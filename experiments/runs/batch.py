@@ -86,7 +86,7 @@ def simulate_many(
         limit_pair(limit)
     count = os.cpu_count() or 1 if workers is None else workers
     if count < 1:
-        raise InputError(f"{count} workers are asked for; expected one at least")
+        raise InputError(f"the number of workers is {count}; expected 1 or more")
     controllers = {name: realized_controller(design, kind) for name, kind in anti_windups.items()}
     return _streamed(_cases(plants, references, controllers, limits), time_s, count)
 

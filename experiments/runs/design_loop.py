@@ -115,7 +115,7 @@ def plant_loop(
     """
     if plant.relative_degree < 1 and not plant.delay_s and controller.forward.d[0]:
         raise InputError(
-            "the true plant has as many zeros as poles and no dead time; expected more poles, or the loop is algebraic"
+            "the true plant has as many zeros as poles and no dead time; expected more poles than zeros or a dead time"
         )
     P = realize(plant_block(plant))
     delays = np.array([plant.delay_s, controller.delay_s, controller.delay_s])

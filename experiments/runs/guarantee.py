@@ -22,7 +22,7 @@ from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
 FINE = 200  # frequencies a decade where a true plant is compared with the bound
-OUTSIDE = "the true plant is not within W_a of the design's model, with as many poles in the right half plane"
+OUTSIDE = "the true plant is not within W_a of the model, or has another number of poles in the right half plane"
 TURNED = 1.0  # rad between neighbouring frequencies, beyond which exp(-j omega (h' - h)) may be anything
 
 
@@ -97,14 +97,14 @@ def guarantee_within(design: Design, anti_windup: AntiWindup) -> Guarantee:
 
 def _without_criterion(design: Design, anti_windup: AntiWindup) -> Guarantee | None:
     if not anti_windup.theta1_tilde.is_stable:
-        return Guarantee(0.0, "theta1~ is not stable by itself, and no criterion of ours judges it in the loop")
+        return Guarantee(0.0, "theta1~ is not stable by itself, so that no criterion applies")
     if anti_windup.theta2(design.loop_plant).is_stable:
         return None
     sector = sector_text(circle_sector(anti_windup.theta1_tilde))
     return Guarantee(
         0.0,
-        "theta2 is not stable, so the output keeps what saturation leaves in it, and of Popov's sectors only that of "
-        f"the circle criterion, {sector}, counts under a reference",
+        "theta2 is not stable, so the output does not return to that of the linear loop (for the control alone the "
+        f"circle criterion gives the sector {sector})",
     )
 
 

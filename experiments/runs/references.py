@@ -57,13 +57,13 @@ class Reference:
         if not len(self.amplitudes) == len(self.omegas) == len(self.phases_rad) > 0:
             raise InputError(
                 f"the reference has {len(self.omegas)} frequencies, {len(self.amplitudes)} amplitudes and "
-                f"{len(self.phases_rad)} phases; expected as many of each, and one at least"
+                f"{len(self.phases_rad)} phases; expected equal numbers of at least 1"
             )
         for amplitude, omega, phase in zip(self.amplitudes, self.omegas, self.phases_rad, strict=True):
             if amplitude != 0 and omega == 0 and math.sin(phase) == 0:
                 raise InputError(
-                    f"the reference of frequency 0 has the phase {phase:g}, with which it is 0 at all times; expected "
-                    "the phase pi/2, with which it is the constant of its amplitude"
+                    f"the reference of frequency 0 has the phase {phase:g}, which makes it 0 at all times; expected "
+                    "pi/2, which makes it a constant of its amplitude"
                 )
         numbers = {
             "amplitude": self.amplitudes,
@@ -171,8 +171,8 @@ class SampledReference:
             object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=float))
         if not (self.time_s.shape == self.values.shape and self.time_s.ndim == 1 and len(self.time_s) > 0):
             raise InputError(
-                f"the sampled reference has shapes {self.time_s.shape} and {self.values.shape}; expected as many times "
-                "as values, and one at least"
+                f"the sampled reference has shapes {self.time_s.shape} and {self.values.shape}; expected equal "
+                "lengths of at least 1"
             )
         if not (np.isfinite(self.time_s).all() and np.isfinite(self.values).all()):
             raise InputError("the sampled reference is not finite; expected finite numbers")

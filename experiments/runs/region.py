@@ -7,6 +7,7 @@ import math
 
 from experiments.runs.references import Reference, SampledReference
 from experiments.runs.steady_control import Wave, peak, response, steady_constant
+from identification.base.digits import lower_end
 from identification.base.errors import InputError
 from identification.model.plant import PlantModel
 
@@ -56,9 +57,9 @@ def require_within_region(
         reached = peak(waves, at_rest - middle).value / half if math.isfinite(constant) else math.inf
         if reached >= 1:
             raise InputError(
-                f"the plant has a pole at {pole:.4g} rad/s in the right half plane, and the reference takes its mode "
-                f"{reached:.4g} times as far as the limits {low:g} to {high:g} can hold it: it escapes for ever; "
-                "expected a smaller reference or wider limits"
+                f"the plant has a pole at {pole:.4g} rad/s in the right half plane, and the reference needs a state of "
+                f"its mode {reached:.4g} times the largest that the limits {low:g} to {high:g} can hold; expected a "
+                "smaller reference or wider limits"
             )
 
 
@@ -80,9 +81,8 @@ def require_short(plant: PlantModel, until_s: float) -> None:
     if until_s > longest:
         fastest = GROWTH / longest
         raise InputError(
-            f"the run lasts {until_s:g} s; the plant has a pole at {fastest:.4g} rad/s in the right half plane, with "
-            f"which the engine's rounding grows like exp({fastest:.4g} t), so that {longest:.4g} s are "
-            "expected at most, or the sampled controller, which has no such mode"
+            f"the run lasts {until_s:.9g} s; expected at most {lower_end(longest, 4)} s, since the plant's pole at "
+            f"{fastest:.4g} rad/s in the right half plane amplifies rounding errors (sampled has no such limit)"
         )
 
 

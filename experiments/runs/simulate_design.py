@@ -71,7 +71,7 @@ def simulate_design(
         :func:`experiments.engine.simulate.simulate`.
     """
     if samples < 2:
-        raise InputError(f"{samples} samples are asked for; expected two or more")
+        raise InputError(f"the number of samples is {samples}; expected 2 or more")
     if until_s is None:
         until_s = PERIODS * span(design, reference) if isinstance(reference, Reference) else reference.time_s[-1]
     require_within_region(plant or design.loop_plant, reference, limit_pair(limits))

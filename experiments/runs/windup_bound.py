@@ -133,9 +133,7 @@ class Windup:
     def __str__(self) -> str:
         """In words, without a full stop."""
         if self.bound is None:
-            return (
-                "the windup ends once the linear loop's control stays within the limits, which it does not by the end"
-            )
+            return "the windup ends once the linear loop's control stays within the limits, which is after this run"
         known = (
             "" if self.stored is None else f" (known before the run) and at most {self.stored:.3g} (by the state then)"
         )

@@ -102,7 +102,7 @@ def _here(work: Callable[[Item], Result], items: Sequence[Item]) -> Done[Result]
                 for done in wait(running, return_when=FIRST_COMPLETED).done:
                     yield running.pop(done), done.result()
         except BrokenProcessPool:
-            raise WorkersLostError("a process that computed was killed") from None
+            raise WorkersLostError("a worker process was killed") from None
         except InputError:
             pool.shutdown(cancel_futures=True)  # a process that is itself a child would wait for its own for ever
             raise
@@ -137,7 +137,7 @@ def _answer(asked: dict[str, str], work: Callable[[Item], Result], item: Item) -
         if own[name] != there:
             raise InputError(f"a worker has {name} {own[name][:12]} and the command {there[:12]}; expected the same")
     if os.environ.get("OPENBLAS_NUM_THREADS") != "1":
-        raise InputError("a worker lets the matrix library have several threads; expected OPENBLAS_NUM_THREADS=1 there")
+        raise InputError("a worker uses several threads of the matrix library; expected OPENBLAS_NUM_THREADS=1 there")
     return work(item)
 
 

@@ -22,7 +22,7 @@ LIMIT = click.option("--limit", type=float, help="Use the saturation limits +-LI
 
 @click.group("thesis", cls=CommandGroup)
 def thesis() -> None:
-    """Reproduce and judge the thesis: its experiments, claims and equations."""
+    """Reproduce and judge the thesis."""
 
 
 thesis.add_command(claims_command)
@@ -33,7 +33,10 @@ thesis.add_command(equations_command)
 @thesis.command("pid")
 @OUTPUT_FOLDER
 def pid(output: Path) -> None:
-    """Simulate the PID benchmark of section 2.2: pid.csv, pid_summary.csv."""
+    """Simulate the PID benchmark of section 2.2.
+
+    The command writes pid.csv and pid_summary.csv.
+    """
     from experiments.thesis.studies.pid import pid_tables
 
     write_into(output, pid_tables())
@@ -43,7 +46,10 @@ def pid(output: Path) -> None:
 @DESIGN
 @OUTPUT_FOLDER
 def f_gamma(design: Path, output: Path) -> None:
-    """Compute f over gamma for the bound of DESIGN: f_gamma.csv, f_gamma_summary.csv."""
+    """Compute f over gamma for the bound of DESIGN.
+
+    The command writes f_gamma.csv and f_gamma_summary.csv.
+    """
     from design.design_file import read_design
     from experiments.thesis.studies.f_gamma import f_gamma_tables
 
@@ -54,7 +60,10 @@ def f_gamma(design: Path, output: Path) -> None:
 @DESIGN
 @OUTPUT_FOLDER
 def trade_off(design: Path, output: Path) -> None:
-    """Compute f of the corrected anti-windup over recovery time and sector: trade_off.csv, trade_off_summary.csv."""
+    """Compute f over recovery time and sector.
+
+    f is that of the corrected anti-windup. The command writes trade_off.csv and trade_off_summary.csv.
+    """
     from tqdm import tqdm
 
     from design.design_file import read_design
@@ -69,7 +78,10 @@ def trade_off(design: Path, output: Path) -> None:
 @DESIGN
 @OUTPUT_FOLDER
 def interpolation(design: Path, output: Path) -> None:
-    """Map where each design of Q works: interpolation.csv, interpolation_map.csv, interpolation_summary.csv."""
+    """Map where each design of Q works.
+
+    The command writes interpolation.csv, interpolation_map.csv and interpolation_summary.csv.
+    """
     from design.design_file import read_design
     from experiments.thesis.studies.interpolation import interpolation_tables
 
@@ -80,7 +92,10 @@ def interpolation(design: Path, output: Path) -> None:
 @click.argument("designs", metavar="DESIGN...", nargs=-1, required=True, type=INPUT)
 @OUTPUT_FOLDER
 def robustness(designs: tuple[Path, ...], output: Path) -> None:
-    """Compute |W_a C S| and the margins of each DESIGN: robustness.csv, robustness_summary.csv."""
+    """Compute |W_a C S| and margins of each DESIGN.
+
+    The command writes robustness.csv and robustness_summary.csv.
+    """
     from design.design_file import read_design
     from experiments.thesis.studies.robustness import robustness_tables
 
@@ -95,7 +110,10 @@ def robustness(designs: tuple[Path, ...], output: Path) -> None:
 @LIMIT
 @OUTPUT_FOLDER
 def chapter_2(design: Path, limit: float | None, output: Path) -> None:
-    """Simulate the loop of chapter 2: delay_free.csv, delay_free_summary.csv."""
+    """Simulate the loop of chapter 2.
+
+    The command writes delay_free.csv and delay_free_summary.csv.
+    """
     from design.design_file import read_design
     from experiments.thesis.studies.chapter_2 import delay_free_tables
 
@@ -107,7 +125,10 @@ def chapter_2(design: Path, limit: float | None, output: Path) -> None:
 @LIMIT
 @OUTPUT_FOLDER
 def chapter_4(design: Path, limit: float | None, output: Path) -> None:
-    """Simulate the loop of chapter 4: extended.csv, extended_summary.csv."""
+    """Simulate the loop of chapter 4.
+
+    The command writes extended.csv and extended_summary.csv.
+    """
     from design.design_file import read_design
     from experiments.thesis.studies.chapter_4 import extended_tables
 
@@ -119,7 +140,10 @@ def chapter_4(design: Path, limit: float | None, output: Path) -> None:
 @SCHEDULER
 @OUTPUT_FOLDER
 def limits(design: Path, scheduler: str | None, output: Path) -> None:
-    """Bound the least peak error of any controller within the limits: limits_KIND.csv, limits_KIND_summary.csv."""
+    """Bound the least peak error within limits.
+
+    The bound holds for every controller. The command writes limits_KIND.csv and limits_KIND_summary.csv.
+    """
     from tqdm import tqdm
 
     from design.design_file import read_design
@@ -138,7 +162,10 @@ def limits(design: Path, scheduler: str | None, output: Path) -> None:
 @SCHEDULER
 @OUTPUT_FOLDER
 def conditions(scheduler: str | None, output: Path) -> None:
-    """Search for the conditions that the thesis does not print: conditions.csv, conditions_summary.csv."""
+    """Search for the thesis's unprinted conditions.
+
+    The command writes conditions.csv and conditions_summary.csv.
+    """
     from functools import partial
 
     from tqdm import tqdm
@@ -154,7 +181,10 @@ def conditions(scheduler: str | None, output: Path) -> None:
 @thesis.command("wide-conditions")
 @OUTPUT_FOLDER
 def wide_conditions(output: Path) -> None:
-    """Search more conditions than the command conditions does, for some minutes: wide_conditions.csv."""
+    """Search more conditions, for some minutes.
+
+    The search is wider than that of the command `conditions`. The command writes wide_conditions.csv.
+    """
     from functools import partial
 
     from tqdm import tqdm
@@ -171,7 +201,10 @@ def wide_conditions(output: Path) -> None:
 @LIMIT
 @OUTPUT_FOLDER
 def sampled_rates(design: Path, limit: float | None, output: Path) -> None:
-    """Run the loop of chapter 4 on a computer at several sampling rates: sampled.csv, sampled_summary.csv."""
+    """Run chapter 4's controller at several rates.
+
+    The controller runs on a computer. The command writes sampled.csv and sampled_summary.csv.
+    """
     from design.design_file import read_design
     from experiments.thesis.studies.sampled_rates import sampled_rates_tables
 
@@ -183,7 +216,10 @@ def sampled_rates(design: Path, limit: float | None, output: Path) -> None:
 @LIMIT
 @OUTPUT_FOLDER
 def compare(design: Path, limit: float | None, output: Path) -> None:
-    """Compare the anti-windups of DESIGN with published ones: compare.csv, compare_runs.csv."""
+    """Compare DESIGN with published anti-windups.
+
+    The command writes compare.csv and compare_runs.csv.
+    """
     from tqdm import tqdm
 
     from design.design_file import read_design
@@ -201,7 +237,11 @@ def compare(design: Path, limit: float | None, output: Path) -> None:
 @LIMIT
 @OUTPUT_FOLDER
 def hidden_modes(design: Path, limit: float | None, output: Path) -> None:
-    """Run the loop of chapter 4 for an hour with rounded states: hidden_modes.csv, hidden_modes_summary.csv."""
+    """Compute the drift that rounding causes.
+
+    The loop is that of chapter 4, for a quarter of an hour. The command writes hidden_modes.csv and
+    hidden_modes_summary.csv.
+    """
     from tqdm import tqdm
 
     from design.design_file import read_design
@@ -218,7 +258,10 @@ def hidden_modes(design: Path, limit: float | None, output: Path) -> None:
 def campaign(
     design: Path, plants: int, seed: int, scheduler: str | None, output: Path, anew: bool, limit: float | None
 ) -> None:
-    """Run DESIGN with plants drawn within W_a, like the command campaign."""
+    """Run DESIGN with plants drawn within W_a.
+
+    The reference is the thesis's. All else is as in `experiments campaign`.
+    """
     from design.design_file import read_design
     from experiments.campaign.run_campaign import run_campaign
     from experiments.thesis.printed_choices import thesis_reference
@@ -236,7 +279,10 @@ def campaign(
 @click.argument("sweeps", nargs=-1, required=True, type=INPUT)
 @OUTPUT_FOLDER
 def additive_error(model: str, sweeps: tuple[Path, ...], output: Path) -> None:
-    """Compute the additive error of SWEEPS against MODEL: additive_error.csv, additive_error_summary.csv."""
+    """Compute the distance of SWEEPS from MODEL.
+
+    The command writes additive_error.csv and additive_error_summary.csv.
+    """
     from design.asked_model import asked_model
     from experiments.thesis.studies.additive_error import additive_error_tables
     from identification.sweeps.read_sweeps import read_sweeps

@@ -188,13 +188,13 @@ def read_axis(path: Path) -> dict[str, Any]:
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"{path}: is no TOML ({error}); expected lines such as limit = [-10, 10]") from None
+        raise InputError(f"{path}: is not TOML ({error}); expected lines such as limit = [-10, 10]") from None
     found = {}
     for name, value in content.items():
         if name not in KEYS:
             close = get_close_matches(name, KEYS, 1)
             meant = f"did you mean {close[0]}?" if close else f"expected {', '.join(KEYS)}"
-            raise InputError(f"{path}: {shown(name)} is no key of an axis; {meant}")
+            raise InputError(f"{path}: {shown(name)} is not a key of an axis file; {meant}")
         found[name] = KEYS[name].read(value, f"{path}: {name}")
     if "reference" in found:
         found["reference"] = str(path.parent / found["reference"])
@@ -213,12 +213,12 @@ def require_consistent(values: Mapping[str, Any], place: str = "") -> None:
     for name in SINUSOIDS:
         if name in values and "reference" in values:
             raise InputError(
-                f"{place}{name} belongs to a reference of sinusoids; found reference {shown(values['reference'])} too"
+                f"{place}both {name} and reference {shown(values['reference'])} are given; expected one of them"
             )
     counts = {name: len(values[name]) for name in ("reference-hz", "amplitude", "phase") if name in values}
     if len(set(counts.values())) > 1:
-        said = ", ".join(f"{name} {count}" for name, count in counts.items())
-        raise InputError(f"{place}these are not as many: {said}; expected one of each for every frequency")
+        said = ", ".join(f"{count} of {name}" for name, count in counts.items())
+        raise InputError(f"{place}the counts differ: {said}; expected one value for each frequency")
 
 
 def axis_text(values: Mapping[str, Any], notes: Mapping[str, str]) -> str:

@@ -29,7 +29,7 @@ class AxisOption(click.Option):
             for name in (*SINUSOIDS, "reference"):
                 if name in values and name not in options and "amplitude" in options:
                     follows = {"reference": "a file", "slope": "a ramp"}.get(name, f"a reference with a {name}")
-                    raise InputError(f"{path}: the {ctx.info_name} study is for sinusoids; this axis follows {follows}")
+                    raise InputError(f"{path}: the axis follows {follows}; expected sinusoids for {ctx.info_name}")
             ctx.default_map = {str(options[name].name): value for name, value in values.items() if name in options}
             for name in {"limit"} & values.keys() & options.keys():
                 if options[name].multiple:

@@ -86,7 +86,7 @@ class CommandGroup(Console):
         except InputError as error:
             raise Refusal(plain(str(error))) from None
         except (ArithmeticError, np.linalg.LinAlgError) as error:
-            raise Refusal(f"the numbers given are too extreme to compute with ({error})") from None
+            raise Refusal(f"the given numbers are too large or too small to compute with ({error})") from None
         except MemoryError as error:
             asked = f" ({str(error)[:1].lower()}{str(error)[1:]})" if str(error) else ""
             raise Refusal(f"out of memory{asked}; expected less input, or a machine with more memory") from None
@@ -94,7 +94,7 @@ class CommandGroup(Console):
             if error.name not in EXTRAS:
                 raise
             extra = f'pip install "antiwindup-thesis[{EXTRAS[error.name]}]"'
-            raise Refusal(f"{error.name} is not installed, which this command needs; give {extra}") from None
+            raise Refusal(f"this command needs {error.name}, which is not installed; run {extra}") from None
         except OSError as error:
             raise Refusal(plain(f"the operating system refuses ({error})")) from None
         except click.ClickException as error:

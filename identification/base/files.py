@@ -139,7 +139,9 @@ def require_writable(*targets: Path, inputs: Iterable[Path] = ()) -> None:
     goals = {path: true_path(path) for path in targets}  # a link is followed, not replaced
     read = {true_path(path) for path in inputs}
     if len(set(goals.values())) < len(targets):
-        raise InputError(f"{', '.join(map(str, targets))}: two of these are one file; expected different files")
+        raise InputError(
+            f"{', '.join(map(str, targets))}: two of these outputs are the same file; expected different files"
+        )
     for path, goal in goals.items():
         if goal in read:
             raise InputError(f"{path}: is an input too; expected another file to write")
@@ -241,6 +243,6 @@ def require_replaceable(path: Path) -> None:
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from None
     if not S_ISREG(mode):
-        raise InputError(f"{path}: cannot be written; expected a file, found something else")
+        raise InputError(f"{path}: cannot be written, since it is not a regular file")
     if not _protected_too.get() and not (mode & 0o222 and os.access(path, os.W_OK)):
         raise InputError(f"{path}: is write-protected; expected a file that may be replaced, or --force")

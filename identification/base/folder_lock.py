@@ -78,7 +78,7 @@ def _held(lock: Path, target: Path) -> Iterator[None]:
     try:
         holder.acquire()
     except Timeout:
-        raise InputError(f"{target}: {_holder(lock)} is writing it; expected none, wait for its end") from None
+        raise InputError(f"{target}: {_holder(lock)} is writing it; wait until that ends") from None
     except OSError as error:
         raise InputError(f"{target}: cannot be written ({error.strerror})") from None
     try:
@@ -99,7 +99,7 @@ def _require_ours(lock: Path) -> None:
             return
         found = lock.lstat()
         if not (S_ISREG(found.st_mode) and found.st_nlink == 1 and OURS.fullmatch(lock.read_bytes())):
-            raise InputError(f"{lock}: is no lock of this project; expected no such file")
+            raise InputError(f"{lock}: is not a lock file of this project; expected no such file")
     except FileNotFoundError:  # which its holder has just removed
         return
     except OSError as error:

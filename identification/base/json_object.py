@@ -26,8 +26,9 @@ def read_json(path: Path, schema: int) -> dict[str, Any]:
         Another schema, or see :func:`read_object`.
     """
     content = read_object(path)
-    if content.get("schema") != schema:
-        raise InputError(f"{path}: schema is {shown(content.get('schema'))}; expected {schema}")
+    found = content.get("schema")
+    if isinstance(found, bool) or found != schema:
+        raise InputError(f"{path}: schema is {shown(found)}; expected {schema}")
     return content
 
 
@@ -89,6 +90,36 @@ def objects(content: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
     return values
 
 
+def require_known(content: Any, known: Any, place: str = "") -> None:
+    """Require that a reader took all of a JSON document: a misspelt member that may be left out would not be missed.
+
+    Parameters
+    ----------
+    content
+        The document.
+    known
+        What the program writes of it after it was read.
+    place
+        Where in a file it stands.
+
+    Raises
+    ------
+    InputError
+        A member is not known, a list has another length, or a value is of another type.
+    """
+    where = place or "the file"
+    if isinstance(content, dict) and isinstance(known, Mapping):
+        for key, value in content.items():
+            if key not in known:
+                raise InputError(f"{where} has the member {shown(key)}; expected one of {', '.join(known)}")
+            require_known(value, known[key], shown(key))
+    elif isinstance(content, list) and isinstance(known, list | tuple) and len(content) == len(known):
+        for own, other in zip(content, known, strict=True):
+            require_known(own, other, place)
+    elif isinstance(content, list) or _kind(content) is not _kind(known):
+        raise InputError(f"{where} is {shown(content)}; expected the form of {shown(known)}")
+
+
 def number(content: Mapping[str, Any], key: str) -> float:
     """Return the number at ``key``; raises InputError when there is none."""
     value = content.get(key)
@@ -109,10 +140,10 @@ def numbers(content: Mapping[str, Any], key: str) -> tuple[float, ...]:
 
 def whole(content: Mapping[str, Any], key: str) -> int:
     """Return the whole number at ``key``; raises InputError when there is none."""
-    value = content.get(key)
-    if isinstance(value, bool) or not isinstance(value, int):
+    value = number(content, key)
+    if not value.is_integer():
         raise InputError(f"{shown(key)} is {shown(value)}; expected a whole number")
-    return value
+    return int(value)
 
 
 def words(content: Mapping[str, Any], key: str) -> str:
@@ -146,6 +177,10 @@ def or_none(reader: Reader) -> Reader:
 
 READERS: dict[str, Reader] = {"float": number, "int": whole, "str": words, "bool": truth}
 READERS |= {f"{name} | None": or_none(reader) for name, reader in READERS.items()}
+
+
+def _kind(value: object) -> type:
+    return float if type(value) is int else type(value)
 
 
 def _object(members: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -50,7 +50,7 @@ def read_manifest(folder: Path) -> dict[str, Written]:
         files = member(read_json(path, SCHEMA), "files")
         for name in files:
             if not name.isprintable() or not Path(name).parts or Path(name).is_absolute() or ".." in Path(name).parts:
-                raise InputError(f"{shown(name)} leads out of the folder; expected the name of a file in it")
+                raise InputError(f"{shown(name)} lies outside the folder; expected the name of a file in it")
         return {name: record(Written, member(files, name)) for name in files}
     except MissingFile:
         return {}
@@ -84,7 +84,7 @@ def read_journal(path: Path) -> dict[str, set[str]]:
         if noted := NOTED.fullmatch(line):
             found.setdefault(json.loads(noted[1]), set()).add(noted[2])
         elif line and not line.startswith('["'):
-            raise InputError(f"{path}, line {number}: no path with a hash; expected the journal of a build")
+            raise InputError(f"{path}, line {number}: holds no path with a hash; expected the journal of a build")
     return found
 
 

@@ -204,7 +204,9 @@ def _touching(
     ratio, some = np.full(omega.size, np.inf), residual > 0
     ratio[some] = np.abs(bound(1j * omega[some])) / residual[some]
     if not np.all(ratio >= 1):
-        raise InputError(f"residuals of {residual.max():.3g} at most leave no digits for a bound; expected other units")
+        raise InputError(
+            f"W_a misses a residual by rounding errors (the largest is {residual.max():.3g}); expected other units"
+        )
     touches: list[Touch] = []
     for i in np.argsort(ratio, kind="stable")[: np.count_nonzero(ratio <= 1 + NEAR)]:
         if all(abs(np.log(omega[i] / touch.omega)) > WIDTH for touch in touches):

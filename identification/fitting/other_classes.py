@@ -88,8 +88,8 @@ def refuse_unstable(test: FrequencyResponse, structure: Structure | None, distan
     if BETTER * found < scaled.distance(scaled.fit(RICHEST, None, np.inf)):
         said = ", ".join(f"{pole.real:.4g}" + (f" +- {pole.imag:.4g}j" if pole.imag else "") for pole in poles)
         raise InputError(
-            f"{test.name}: a plant with poles at {said} rad/s, in the right half plane, fits at {100 * found:.2g} %, a "
-            f"stable one at {100 * distance:.2g} %; expected a stable plant, poles at s = 0 apart"
+            f"{test.name}: an unstable plant, with poles at {said} rad/s, fits to {100 * found:.2g} %, the best stable "
+            f"one to {100 * distance:.2g} %; expected a plant without poles in the right half plane"
         )
 
 

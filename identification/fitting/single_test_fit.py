@@ -245,7 +245,7 @@ class ScaledTest:
         if not values[0] > SINGULAR:
             raise Undetermined(
                 f"{self.name}: the data do not determine {structure}; expected other numbers of modes and real roots, "
-                "or lines where these show"
+                "or lines near them"
             )
         units = np.append(np.ones(structure.size - 1), 1 / self.centre)
         weighted = vectors * (scale * units)[:, None]

@@ -124,7 +124,7 @@ def choose_columns(place: str, names: Sequence[str], noun: str) -> list[str]:
     found = [name for name in names if name in KNOWN]
     for name in found:
         if found.count(name) > 1:
-            raise InputError(f"{place}: '{name}' comes twice among the {noun}; expected it once")
+            raise InputError(f"{place}: the {noun} hold '{name}' twice; expected it once")
     for group in EXCLUSIVE:
         for one, other in combinations(group, 2):
             both = [next((name for name in found if name in side), None) for side in (one, other)]

@@ -117,14 +117,14 @@ def name_columns(place: str, names: Sequence[str], meant: Mapping[str, str]) -> 
         same = [index for index, said in spellings if index > first and said == spelt(names[first])]
         if same and not names[first].lower().startswith("trace "):
             both = f"{quoted(names[first])} and {quoted(names[same[0]])}"
-            raise InputError(f'{place}: both {both} say {name}; expected one, or --columns "NAME={name}"')
+            raise InputError(f'{place}: both {both} mean {name}; expected one, or --columns "NAME={name}"')
     if "" in complete:
         return complete[""]
     if len(complete) > 1:
         chosen = [f"{names[index]}={name}" for name, (index, _) in next(iter(complete.values())).items()]
         raise InputError(
-            f"{place}: the columns name {len(complete)} responses ({', '.join(complete)}); expected one, such as by "
-            f'--columns "{",".join(chosen)}"'
+            f"{place}: the columns hold {len(complete)} responses ({', '.join(complete)}); expected one, or for "
+            f'example --columns "{",".join(chosen)}"'
         )
     if complete:
         return next(iter(complete.values()))
@@ -134,7 +134,7 @@ def name_columns(place: str, names: Sequence[str], meant: Mapping[str, str]) -> 
         return test
     _require_units(place, names, everything, [each for each in spellings if each[1].ours is None])
     choose_columns(place, ours, "columns")
-    raise InputError(f"{place}: the columns are of several responses; expected one of them by --columns NAME=OURS")
+    raise InputError(f"{place}: the columns belong to several responses; expected one, or --columns NAME=OURS")
 
 
 def _require_units(place: str, names: Sequence[str], found: Columns, unsaid: Sequence[tuple[int, Spelling]]) -> None:
@@ -145,8 +145,8 @@ def _require_units(place: str, names: Sequence[str], found: Columns, unsaid: Seq
         doubts = [f"{quoted(name)} is {' or '.join((*ours, 'another unit')[:2])}" for name, ours in which]
         chosen = ",".join(f"{name}={ours[0]}" for name, ours in which)
         raise InputError(
-            f"{place}: the header leaves open whether {', '.join(doubts)}; expected a unit in brackets, or "
-            f'--columns "{chosen}" or its like'
+            f"{place}: the header does not say whether {', '.join(doubts)}; expected a unit in brackets, or for "
+            f'example --columns "{chosen}"'
         )
 
 

@@ -132,7 +132,7 @@ def _refusal(path: Path, scopes: Mapping[str, Scope], everything: Scope) -> Inpu
             names = ", ".join(quoted(f"{prefix}{name}") for name in unsaid)
             verb = "does" if len(unsaid) == 1 else "do"
             return InputError(
-                f'{path}: {names} {verb} not say which quantity in which unit; expected --columns "{chosen}"{instead}'
+                f'{path}: {names} {verb} not name a quantity with a unit; expected --columns "{chosen}"{instead}'
             )
     for name, each in everything.items():
         if each.kind not in PLAIN:

@@ -44,4 +44,4 @@ class Reading:
     def __post_init__(self) -> None:
         if unknown := sorted({*self.columns.values()} - KNOWN):
             names = ", ".join(sorted(KNOWN))
-            raise InputError(f"--columns: {quoted(unknown[0])} is no name of ours; expected one of {names}")
+            raise InputError(f"--columns: {quoted(unknown[0])} is not a name of this program; expected one of {names}")

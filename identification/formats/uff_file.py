@@ -66,7 +66,7 @@ def read_uff(path: Path, reading: Reading) -> list[Table]:
         remarks = [(f"the response is {each.ordinate}",) if each.ordinate else () for each in chosen]
     elif inputs or outputs:
         if len(inputs) != len(outputs):
-            raise InputError(f"{path}: holds {len(inputs)} inputs and {len(outputs)} outputs; expected as many")
+            raise InputError(f"{path}: holds {len(inputs)} inputs and {len(outputs)} outputs; expected equal numbers")
         pairs = [(name, one, other) for (name, one), other in zip(inputs, outputs, strict=True)]
         ends = [(other.ends[0], one.ends[0]) for _, one, other in pairs]
         tests = [_record(path, *pair) for pair in of_one_plant(path, pairs, ends, reading)]

@@ -181,11 +181,11 @@ def _real(word: str) -> float:
     try:
         return float(word.upper().replace("D", "E"))
     except ValueError:
-        raise ValueError(f"{quoted(word)} is no number") from None
+        raise ValueError(f"{quoted(word)} is not a number") from None
 
 
 def _whole(word: str) -> int:
     """The whole number, 0 if there is none, as Fortran reads it."""
     if not re.fullmatch(r"[ \t]*([-+]?\d{1,18})?[ \t]*", word, re.ASCII):
-        raise ValueError(f"{quoted(word.strip())} is no whole number")
+        raise ValueError(f"{quoted(word.strip())} is not a whole number")
     return int(word.strip() or 0)

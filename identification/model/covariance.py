@@ -79,15 +79,14 @@ class Covariance:
             rows = of.get(key)
             found = tuple(numbers({key: row}, key) for row in rows) if isinstance(rows, list) else ()
             if [len(row) for row in found] != [size] * size:
-                raise InputError(f"'{key}' is no matrix of {size} rows of {size} numbers")
+                raise InputError(f"'{key}' is not a matrix; expected {size} rows of {size} numbers")
             return found
 
         freedom, count = whole(content, "freedom"), whole(content, "count")
         scatter = or_none(matrix)(content, "scatter")
         if freedom < 1 or count < 1 + (scatter is not None):
-            raise InputError(
-                f"'freedom' is {freedom} and 'count' {count}; expected 1 or more, 2 tests where they scatter"
-            )
+            least = 1 + (scatter is not None)
+            raise InputError(f"'freedom' is {freedom} and 'count' {count}; expected at least 1 and {least}")
         return cls(matrix(content, "noise"), matrix(content, "misfit"), scatter, freedom, count)
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from identification.base.errors import InputError
-from identification.base.json_object import member, read_json
+from identification.base.json_object import member, read_json, require_known
 from identification.model.additive_bound import AdditiveBound
 from identification.model.fit_record import FitRecord, Numbers
 from identification.model.plant import PlantModel
@@ -25,6 +25,8 @@ from identification.model.plant_json import (
 from identification.model.signals import UNNAMED, Signals
 
 SCHEMA = 1
+
+Record = TypeVar("Record")
 
 
 @dataclass(frozen=True, repr=False)
@@ -71,10 +73,10 @@ class IdentifiedModel:
             table["standard error"] = self.standard_errors
         return f"<p>{escape(repr(self))}</p>{table.to_html(index=False)}"
 
-    def to_json(self) -> str:
-        """The text of model.json; every number is finite or this raises ValueError."""
+    def to_dict(self) -> dict[str, Any]:
+        """The object of model.json."""
         errors = self.standard_errors
-        content = {
+        return {
             "schema": SCHEMA,
             "signals": self.signals.to_dict(),
             "plant": plant_to_dict(self.plant),
@@ -82,7 +84,10 @@ class IdentifiedModel:
             "additive_bound": bound_to_dict(self.additive_bound),
             "fit": {} if self.fit is None else self.fit.to_dict(self.plant),
         }
-        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+    def to_json(self) -> str:
+        """The text of model.json; every number is finite or this raises ValueError."""
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
 
 
 def read_model(path: Path | str) -> IdentifiedModel:
@@ -91,29 +96,27 @@ def read_model(path: Path | str) -> IdentifiedModel:
     Raises
     ------
     InputError
-        No such file, not JSON, another schema, or a number missing or out of range.
+        No such file, not JSON, another schema, a member that is not known, or a number missing or out of range.
     """
     content = read_json(Path(path), SCHEMA)
     try:
         plant = plant_from_dict(member(content, "plant"))
         bound = bound_from_dict(member(content, "additive_bound"))
         signals = Signals.from_dict(member(content, "signals")) if "signals" in content else UNNAMED
+        errors = _recorded(content, "standard_errors", lambda found: from_shape(plant, found))
+        fit = _recorded(content, "fit", lambda found: FitRecord.from_dict(found, plant, bound))
+        model = IdentifiedModel(plant, bound, errors, fit, signals)
+        require_known(content, model.to_dict())
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return IdentifiedModel(plant, bound, _standard_errors(content, plant), _fit(content, plant, bound), signals)
+    return model
 
 
-def _standard_errors(content: Mapping[str, Any], plant: PlantModel) -> Numbers | None:
-    """None where the file has none that are of the plant's shape: nothing is designed from them."""
-    try:
-        return from_shape(plant, member(content, "standard_errors"))
-    except InputError:
+def _recorded(content: Mapping[str, Any], key: str, read: Callable[[Mapping[str, Any]], Record]) -> Record | None:
+    """What a fit leaves beside the model; None where there is nothing."""
+    if content.get(key) in (None, {}):
         return None
-
-
-def _fit(content: Mapping[str, Any], plant: PlantModel, bound: AdditiveBound) -> FitRecord | None:
-    """None where the file does not say all of it: nothing is designed from it."""
     try:
-        return FitRecord.from_dict(member(content, "fit"), plant, bound)
-    except InputError:
-        return None
+        return read(member(content, key))
+    except InputError as error:
+        raise InputError(f"{error} (of {key!r}, which may be left out)") from None

@@ -145,8 +145,8 @@ class PlantModel:
         for kind, roots in (("pole", left), ("zero", zeros)):
             if integrators is None and roots and abs(roots[0]) < NEAR_ZERO * largest:
                 raise InputError(
-                    f"a {kind} is at {roots[0]:.3g} rad/s, which rounding does not tell from 0; expected integrators "
-                    "to say how many there are"
+                    f"a {kind} at {roots[0]:.3g} rad/s differs from 0 by no more than rounding errors; expected the "
+                    "argument integrators, which says how many are at s = 0"
                 )
         (zero_modes, real_zeros), (pole_modes, real_poles) = factors_of(zeros), factors_of(left)
         count -= at_zero

@@ -7,10 +7,14 @@ from dataclasses import asdict
 from typing import Any
 
 from identification.base.errors import InputError, shown
-from identification.base.json_object import number, numbers
+from identification.base.json_object import number, numbers, whole
 from identification.model.additive_bound import AdditiveBound
 from identification.model.modes import Mode
 from identification.model.plant import PlantModel
+
+SLOWEST, FASTEST = 1e-20, 1e20
+"""The least and the largest magnitude of a rate in rad/s or a damping ratio in a file; the second also limits the dead
+time in s. Beyond them a design overflows."""
 
 
 def shaped(plant: PlantModel, values: Iterable[float]) -> dict[str, Any]:
@@ -40,8 +44,8 @@ def from_shape(plant: PlantModel, content: Mapping[str, Any]) -> tuple[float, ..
     counts = [len(of) for of in (plant.zero_modes, plant.pole_modes, plant.real_zeros, plant.real_poles)]
     modes = [_pairs(content, key) for key in ("zero_modes", "pole_modes")]
     rates = [_rates(content, key) for key in ("real_zeros", "real_poles")]
-    if [len(of) for of in (*modes, *rates)] != counts:
-        raise InputError("there are other numbers of modes and real roots than the plant has; expected as many")
+    if (counted := [len(of) for of in (*modes, *rates)]) != counts:
+        raise InputError(f"the numbers of modes and real roots are {counted}; expected {counts}, as of the plant")
     middle = (*(value for of in modes for pair in of for value in pair), *(rate for of in rates for rate in of))
     return (number(content, "gain"), *middle, number(content, "delay_s"))
 
@@ -65,10 +69,10 @@ def plant_from_dict(content: Mapping[str, Any]) -> PlantModel:
         gain=number(content, "gain"),
         zero_modes=_modes(content, "zero_modes"),
         pole_modes=_modes(content, "pole_modes"),
-        delay_s=number(content, "delay_s"),
-        integrators=content.get("integrators", 1),
-        real_zeros=_rates(content, "real_zeros"),
-        real_poles=_rates(content, "real_poles"),
+        delay_s=sized("delay_s", number(content, "delay_s"), least=0.0),
+        integrators=whole(content, "integrators") if "integrators" in content else 1,
+        real_zeros=_sized_rates(content, "real_zeros"),
+        real_poles=_sized_rates(content, "real_poles"),
     )
 
 
@@ -88,18 +92,26 @@ def bound_to_dict(bound: AdditiveBound) -> dict[str, Any]:
 def bound_from_dict(content: Mapping[str, Any]) -> AdditiveBound:
     """Read what :func:`bound_to_dict` writes; raises InputError as :func:`plant_from_dict` does."""
     if "pole_modes" not in content:
-        return AdditiveBound.printed_form(*(number(content, key) for key in ("gain", "corner", "omega", "zeta")))
+        rates = (sized(key, number(content, key)) for key in ("corner", "omega", "zeta"))
+        return AdditiveBound.printed_form(number(content, "gain"), *rates)
     return AdditiveBound(
         gain=number(content, "gain"),
         zero_modes=_modes(content, "zero_modes"),
         pole_modes=_modes(content, "pole_modes"),
-        real_zeros=_rates(content, "real_zeros"),
-        real_poles=_rates(content, "real_poles"),
+        real_zeros=_sized_rates(content, "real_zeros"),
+        real_poles=_sized_rates(content, "real_poles"),
     )
 
 
 def _modes(content: Mapping[str, Any], key: str) -> tuple[Mode, ...]:
-    return tuple(Mode(omega, zeta) for omega, zeta in _pairs(content, key))
+    return tuple(Mode(sized("omega", omega), sized("zeta", zeta)) for omega, zeta in _pairs(content, key))
+
+
+def sized(name: str, value: float, least: float = SLOWEST) -> float:
+    """The value; raises InputError when its magnitude is not 0 and not between ``least`` and :data:`FASTEST`."""
+    if value and not least <= abs(value) <= FASTEST:
+        raise InputError(f"{shown(name)} is {value:g}; expected a magnitude from {least:g} to {FASTEST:g}")
+    return value
 
 
 def _pairs(content: Mapping[str, Any], key: str) -> list[tuple[float, float]]:
@@ -113,3 +125,7 @@ def _pairs(content: Mapping[str, Any], key: str) -> list[tuple[float, float]]:
 def _rates(content: Mapping[str, Any], key: str) -> tuple[float, ...]:
     """The list of numbers at ``key``; none where there is no such member."""
     return numbers(content, key) if key in content else ()
+
+
+def _sized_rates(content: Mapping[str, Any], key: str) -> tuple[float, ...]:
+    return tuple(sized(key, rate) for rate in _rates(content, key))

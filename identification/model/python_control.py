@@ -82,7 +82,7 @@ def from_control(system: object) -> Roots:
     import control
 
     if not isinstance(system, control.StateSpace | control.TransferFunction):
-        raise InputError(f"{type(system).__name__} is no transfer function or state space")
+        raise InputError(f"the system is a {type(system).__name__}; expected a transfer function or a state space")
     if not system.issiso():
         raise InputError(f"the system has {system.ninputs} inputs and {system.noutputs} outputs; expected one of each")
     if system.isdtime(strict=True):

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from identification.base.json_object import Reader, member, objects, or_none, record
+from identification.base.errors import InputError
+from identification.base.json_object import Reader, member, objects, or_none, record, whole
 from identification.model.additive_bound import AdditiveBound
 
 
@@ -132,7 +133,13 @@ class BoundReport:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any], bound: AdditiveBound) -> BoundReport:
-        """Read what :meth:`to_dict` writes of a bound; raises InputError when a member is missing."""
+        """Read what :meth:`to_dict` writes of a bound.
+
+        Raises
+        ------
+        InputError
+            A member is missing, or W_a is of another order.
+        """
 
         def excess(of: Mapping[str, Any], key: str) -> Excess:
             return record(Excess, member(of, key))
@@ -144,6 +151,8 @@ class BoundReport:
             "Outside | None": lambda of, key: None if of.get(key) is None else record(Outside, member(of, key)),
             "tuple[Touch, ...]": lambda members, key: tuple(record(Touch, each) for each in objects(members, key)),
         }
+        if "order" in content and whole(content, "order") != bound.order:
+            raise InputError(f"the order of the fit's bound is {content['order']}; expected that of W_a, {bound.order}")
         return record(cls, content, readers)
 
 

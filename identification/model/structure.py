@@ -60,7 +60,9 @@ class Structure:
             A pole lies in the right half plane, or a mode on the imaginary axis.
         """
         if plant.unstable_poles or any(mode.zeta == 0 for mode in (*plant.zero_modes, *plant.pole_modes)):
-            raise InputError("the plant has poles in the right half plane or modes without damping; no fit has such")
+            raise InputError(
+                "the plant has poles in the right half plane or undamped modes; expected neither, as in a fit"
+            )
         right = [mode.zeta < 0 for mode in plant.zero_modes].count(True), [a < 0 for a in plant.real_zeros].count(True)
         left = len(plant.zero_modes) - right[0], len(plant.real_zeros) - right[1]
         sides = left, right, (len(plant.pole_modes), len(plant.real_poles))

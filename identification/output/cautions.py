@@ -50,8 +50,8 @@ def _reversed(result: FitResult, tests: Sequence[FrequencyResponse], reversed_fr
         if reversed_from is not None and np.isfinite(reversed_from):
             before = f"as it is at {percent(reversed_from)} %"
         yield (
-            f"the sign of the phase is reversed: the conjugate fits at {percent(own)} %, the response {before}; if "
-            "your files count a lag as negative, the plant is unstable and not the one fitted"
+            f"the sign of the phase is reversed: the conjugate fits at {percent(own)} %, the response {before}; if a "
+            "lag is negative in your files, the plant is unstable and this fit is wrong"
         )
 
 
@@ -60,23 +60,23 @@ def _outliers(result: FitResult) -> Iterator[str]:
     for fit in result.tests:
         where = f"{fit.name}: the plant misses the line at {fit.worst_omega / (2 * np.pi):.4g} Hz"
         if fit.worst > OUTLIER and fit.around < OUTLIER / 3:
-            mended = "the loss is soft-L1 for it" if result.soft else "--loss soft-l1 lets it hardly count"
-            yield f"{where} by {fit.worst:.2g} times the noise and those beside it by little: an outlier; {mended}"
+            mended = "the loss is soft-L1 for it" if result.soft else "--loss soft-l1 reduces its weight"
+            yield f"{where} by {fit.worst:.2g} times the noise but not its neighbours: an outlier; {mended}"
         elif fit.around > RUN:
-            yield f"{where} and those beside it by {fit.around:.2g} times the noise: it lacks something there"
+            yield f"{where} and its neighbours by {fit.around:.2g} times the noise: the structure is too simple there"
 
 
 def _misfit(result: FitResult) -> Iterator[str]:
     own, nominal = max(test.distance for test in result.tests), max(result.distances)
     if own > POOR and max(test.relative for test in result.tests) > POOR:
-        yield f"a median distance of {percent(own)} % is more than noise leaves on a plant of this class"
+        yield f"noise does not explain a median distance of {percent(own)} %: the plant may be of another class"
     correlation = max(test.correlation for test in result.tests)
     if result.nominal.misfit.any() and correlation > MISSED:
         yield f"the search may have missed a root: {_one_zero_more(result.structure)}"
     if nominal > POOR and nominal > WORSE * own:
         yield (
-            f"the plant is the mean of plants that differ much: it misses a test by {percent(nominal)} %, whose own "
-            f"fit misses it by {percent(own)} % at most; the tests hardly are of one plant"
+            f"the tests differ much: the plant misses one by {percent(nominal)} %, a test's own fit misses it by at "
+            f"most {percent(own)} %; the tests may be of different plants"
         )
 
 
@@ -100,18 +100,18 @@ def _edges(plant: PlantModel, omega: Real) -> dict[str, str]:
         if parameter.quantity == "zeta":
             if size < LEAST_ZETA * (1 + AT_EDGE) and seen:
                 said[parameter.name] = (
-                    f"{_name(parameter)} is {size:.3g}, the least that is sought: the resonance is narrower than the "
-                    "lines lie apart, or undamped"
+                    f"{_name(parameter)} is {size:.3g}, the lower end of the search: the resonance is narrower than "
+                    "the spacing of the lines, or undamped"
                 )
             elif size > most_zeta(omega) * (1 - AT_EDGE):
-                said[parameter.name] = f"{_name(parameter)} is {size:.3g}, the largest that is sought"
+                said[parameter.name] = f"{_name(parameter)} is {size:.3g}, the upper end of the search"
         elif parameter.kind not in ("gain", "delay_s") and not low / OUTSIDE < size < high * OUTSIDE:
             side, end, ideal = ("below", low / BAND, "one at s = 0") if size < low else ("above", high * BAND, "none")
-            where = ", where the search ends" if abs(np.log(size / end)) < AT_EDGE else ""
+            where = ", the end of the search" if abs(np.log(size / end)) < AT_EDGE else ""
             which = "lowest" if side == "below" else "highest"
             said[parameter.name] = (
                 f"{_name(parameter)} is {parameter.value:.4g} rad/s{where}, {side} all lines ({low:.4g} to {high:.4g} "
-                f"rad/s): it rests on what little it changes at the {which} of them, instead of {ideal}"
+                f"rad/s): only its small effect at the {which} of them distinguishes it from {ideal}"
             )
     return said
 
@@ -124,7 +124,7 @@ def _open(result: FitResult, edges: dict[str, str]) -> Iterator[str]:
         ends = sorted((abs(low), abs(high)))
         if parameter.kind != "delay_s" and parameter.name not in edges and ends[1] > OPEN * ends[0]:
             known = ends[1] < UNKNOWN * ends[0]
-            how = f"leave it open between {low:.3g} and {high:.3g}" if known else "do not determine it"
+            how = f"allow every value from {low:.3g} to {high:.3g}" if known else "do not determine it"
             yield f"{_name(parameter)}: the data {how}"
 
 
@@ -132,16 +132,18 @@ def _dead_time(result: FitResult, tests: Sequence[FrequencyResponse]) -> Iterato
     delay_s = result.plant.delay_s
     if not result.structure.delayed:
         right = any(mode.zeta < 0 for mode in result.plant.zero_modes) or any(a < 0 for a in result.plant.real_zeros)
-        stands_in = ", where a zero in the right half plane can stand in for one" if right else ""
+        stands_in = ", and a zero in the right half plane can replace one" if right else ""
         most = f"{result.nominal.intervals[1][-1]:.3g} s"
         yield f"the data show no dead time; in this structure it is at most {most}{stands_in}"
     turns = [same_turn(test.omega) for test in tests if test.record is None]
     if len(turns) == len(tests) and all(turns):
         turn = max(turn or 0.0 for turn in turns)
-        sign = " (an odd one turns the gain's sign)" if any(turns_sign(test.omega) for test in tests) else ""
+        sign = (
+            " (an odd multiple reverses the sign of the gain)" if any(turns_sign(test.omega) for test in tests) else ""
+        )
         yield (
-            f"the lines are equally spaced: they do not tell a dead time of {delay_s:.4g} s from that plus any "
-            f"multiple of {turn:.4g} s{sign}"
+            f"the lines are equally spaced, so that any multiple of {turn:.4g} s can be added to the dead time of "
+            f"{delay_s:.4g} s{sign}"
         )
 
 
@@ -149,7 +151,10 @@ def _alike(result: FitResult) -> Iterator[str]:
     near = [f"{structure} ({more:+.1f})" for structure, more in result.alike.items() if more > -ALIKE]
     better = [f"{structure} ({more:+.1f})" for structure, more in result.alike.items() if more <= -ALIKE]
     if better:
-        yield f"the BIC alone would choose {better[0]}, with roots far outside the band or that these data leave open"
+        yield (
+            f"the BIC alone would choose {better[0]}, with roots far outside the band or roots that the data do not "
+            "determine"
+        )
     if near:
         yield f"structures within {ALIKE:g} of its BIC: {'; '.join(near)}"
 

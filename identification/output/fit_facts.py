@@ -120,7 +120,7 @@ def bound_remarks(report: BoundReport) -> list[str]:
     ]
     if report.touches:
         first = report.touches[0]
-        where = "between the lines, where only its own fit speaks," if first.between_lines else "at a line"
+        where = "between the lines, where only its own fit is known," if first.between_lines else "at a line"
         said.append(f"it touches the residual of {first.test} {where} at {first.omega:.4g} rad/s")
     return said if report.outside is None else [*said, str(report.outside)]
 
@@ -165,11 +165,11 @@ def remarks(result: FitResult) -> list[str]:
     if result.nominal.misfit.any():
         said.append(
             f"neighbouring residuals correlate by up to {correlation:.2f}: they are no noise but what this structure "
-            "leaves, and the intervals are widened for it"
+            "does not explain, and the intervals are widened for it"
         )
     if result.overdispersion > 1:
         said.append(
-            f"the residuals never become noise, whatever the number of modes: their deviance is divided by "
+            f"no number of modes reduces the residuals to noise: their deviance is divided by "
             f"{result.overdispersion:.3g} in the choice of the structure"
         )
     return said

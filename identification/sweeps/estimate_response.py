@@ -90,7 +90,7 @@ def estimate_response(dt: float, u: Real, y: Real, *, held: bool = False) -> Swe
     )
     band = excited_band(np.abs(big_u) ** 2, smoothing=2 * SHORTEST_WINDOW + 1)
     low = band[(band + 1 < SHORTEST_WINDOW) & (big_u[band] != 0)]  # no local model holds there
-    below = LeftOut(omega[low], big_y[low] / big_u[low], "nearer to zero than a window of lines is wide")
+    below = LeftOut(omega[low], big_y[low] / big_u[low], "closer to 0 Hz than the width of a window of lines")
     band = band[(band + 1 >= SHORTEST_WINDOW) & (not held or omega[band] < BELOW_NYQUIST * np.pi / dt)]
     if band.size < 3 * SHORTEST_WINDOW:
         raise InputError(

@@ -77,7 +77,7 @@ def _resampled(table: Table, usual: float) -> tuple[Table, float]:
     intervals = float(np.sum(np.maximum(np.rint(steps / usual), 1)))
     if intervals > MOST_ADDED * steps.size:
         table.refuse(
-            f"an even grid of {usual:.4g} s would have {intervals:.0f} intervals, {steps.size} are there; expected a "
+            f"the record has {steps.size} intervals, an even grid of {usual:.4g} s has {intervals:.0f}; expected a "
             "record without long gaps"
         )
     sampling_s = float(time_s[-1] - time_s[0]) / intervals

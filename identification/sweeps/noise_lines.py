@@ -31,16 +31,16 @@ def within(test: FrequencyResponse, low_hz: float, high_hz: float) -> FrequencyR
         The two are no band, or no line is within.
     """
     if not 0 <= low_hz < high_hz:
-        raise InputError(f"the band is {low_hz:g} to {high_hz:g} Hz; expected two frequencies, the lower one first")
+        raise InputError(f"the band is {low_hz:.12g} to {high_hz:.12g} Hz; expected the lower frequency first")
     low, high = 2 * np.pi * low_hz * (1 - 1e-12), 2 * np.pi * high_hz * (1 + 1e-12)
     kept = (test.omega >= low) & (test.omega <= high)
     if not kept.any():
         first, last = test.omega[[0, -1]] / (2 * np.pi)
         raise InputError(
-            f"{test.name}: has lines from {first:.6g} to {last:.6g} Hz; expected some in the band asked for, "
+            f"{test.name}: has lines from {first:.6g} to {last:.6g} Hz; expected some in the given band, "
             f"{low_hz:.6g} to {high_hz:.6g} Hz"
         )
-    return only(test, kept, "outside the band asked for")
+    return only(test, kept, "outside the given band")
 
 
 def without_noise(tests: Sequence[FrequencyResponse]) -> list[FrequencyResponse]:
@@ -117,8 +117,8 @@ def _trimmed(test: FrequencyResponse, noisy: Flags) -> FrequencyResponse:
         if total.max() >= LEAST:
             kept[side][: int(np.argmax(total)) + 1] = False
     if not kept.any():
-        raise InputError(f"{test.name}: every line is more noise than response; expected lines that show the plant")
-    return only(test, kept, "more noise than response")
+        raise InputError(f"{test.name}: noise exceeds the response at every line; expected less noise")
+    return only(test, kept, "noise exceeds the response")
 
 
 def only(test: FrequencyResponse, kept: Flags, reason: str) -> FrequencyResponse:

@@ -55,7 +55,7 @@ class LeftOut:
     omega, response
         (K,) as in :class:`FrequencyResponse`.
     reason
-        Why, such as "outside the band asked for".
+        Why, such as "outside the given band".
     """
 
     omega: Real
@@ -117,13 +117,13 @@ class FrequencyResponse:
         object.__setattr__(self, "response", response)
         if not (omega.ndim == 1 and omega.shape == response.shape and omega.size):
             raise InputError(
-                f"{self.name}: omega and response have the shapes {omega.shape} and {response.shape}; expected as many "
-                "frequencies as values, and one at least"
+                f"{self.name}: omega and response have the shapes {omega.shape} and {response.shape}; expected equal "
+                "lengths of at least 1"
             )
         if not (np.isfinite(omega).all() and np.isfinite(response).all()):
             raise InputError(f"{self.name}: omega or response is not finite; expected finite numbers")
         if omega[0] <= 0 or np.any(np.diff(omega) <= 0):
-            raise InputError(f"{self.name}: omega is not positive and increasing; expected that, without duplicates")
+            raise InputError(f"{self.name}: omega is not increasing from above 0; expected that, without duplicates")
 
     def __repr__(self) -> str:
         low, high = self.omega[[0, -1]] / (2 * np.pi)

@@ -96,13 +96,13 @@ def usable_lines(
     ends = omega[kept][[0, -1]] if kept.any() else omega.ravel()[[0, -1]]
     reasons = {
         "the input excites them too little": weak & (omega >= ends[0]) & (omega <= ends[1]),
-        "the response cannot be told there from what the record cuts off at its ends": torn & ~drowned & ~weak,
+        "the transients at the ends of the record hide the response": torn & ~drowned & ~weak,
         "noise is more than half of the response": drowned & ~weak,
     }
     left_out += tuple(LeftOut(omega[lines], response[lines], why) for why, lines in reasons.items() if lines.any())
     if kept.sum() < FEWEST:
         why = "; ".join(map(str, left_out)) or "a longer record or a wider sweep"
-        raise InputError(f"{kept.sum()} spectral lines tell of the plant; expected {FEWEST} or more ({why})")
+        raise InputError(f"{kept.sum()} spectral lines can be used; expected {FEWEST} or more ({why})")
     return SweepEstimate(
         omega=omega[kept],
         response=response[kept],

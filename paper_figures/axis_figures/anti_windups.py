@@ -49,7 +49,7 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
         forced = f"every controller leaves an error of {error} or more" if least > 0 else "no error is forced"
         physical = f" From {duration(from_s)} after the start on {forced} by the limits."
     return (
-        "The anti-windups that there are for this design, each in the same loop under the limits "
+        "The anti-windups that exist for this design, each in the same loop under the limits "
         f"{actuator_said(table, signals.input_unit)}. Second order, Eq. (2.23), is the published one, a filter with "
         "two poles; corrected is the one that the program designs in its place. (a) From rest, and "
         "(b) after a disturbance of "

@@ -33,12 +33,12 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
     best, corrected, none = (_after(float(row[f"settling_{name}_s"])) for name in ("upper", *RUNS))
     summary = tables["limits_extended_summary"]
     is_fast = math.isnan(only(summary, "rate_limit"))
-    slopes = "" if is_fast else " Both know no rate limit; the runs have it."
+    slopes = "" if is_fast else " Both ignore the rate limit, which the runs have."
     return (
-        f"How much is left to gain from rest under the limits "
+        "The least error that is possible from rest under the limits "
         f"{actuator_said(summary, design.signals.input_unit)}: the greatest error from a time on, within three "
-        "periods. Grey: what no control within the limits betters, even if it knows the reference in advance; the line "
-        f"on it, or above, is reached by some control.{slopes} The error comes to stay within 1 % of the reference's "
+        "periods. No control within the limits reaches the grey area, even if it knows the reference in advance; some "
+        f"control reaches the line on it, or above.{slopes} The error comes to stay within 1 % of the reference's "
         f"amplitude {best} under the best control that was found, {none} without anti-windup, {corrected} with the "
         "corrected one."
     )

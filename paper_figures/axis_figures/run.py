@@ -36,7 +36,7 @@ def caption(design: Design, tables: Mapping[str, pd.DataFrame]) -> str:
     said = ". ".join(_said(summary, str(run), signals.output_unit) for run in summary["run"])
     return (
         f"The reference from rest under the limits {actuator_said(summary, signals.input_unit)}: output, error, and "
-        f"the control that is asked for with what the actuator gives out; shaded, where it is at a limit. {said}."
+        f"the control before and after the actuator; shaded, where it is at a limit. {said}."
     )
 
 

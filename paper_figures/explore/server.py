@@ -79,7 +79,7 @@ def bound(port: int) -> socket:
         place = create_server((HOST, port))
     except OSError as error:
         why = os.strerror(error.errno or 0)
-        raise InputError(f"--port is {port}, which cannot be had ({why}); expected a free one") from None
+        raise InputError(f"--port is {port}, which cannot be used ({why}); expected a free one") from None
     place.setblocking(False)
     return place
 

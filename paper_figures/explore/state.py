@@ -97,7 +97,7 @@ class State:
                     raise InputError(f"{name} is {value:g}; expected {expected}")
         low, high = self.limits
         if not low < high:
-            raise InputError(f"the limits are {low:g} and {high:g}; expected the lower one first")
+            raise InputError(f"the limits are {low:.12g} and {high:.12g}; expected the lower one first")
         if self.choices.guarantee not in GUARANTEES:
             found = shown(self.choices.guarantee)
             raise InputError(f"{GUARANTEE} is {found}; expected one of {', '.join(GUARANTEES)}")

@@ -9,6 +9,7 @@ from html import escape
 import numpy as np
 
 from design.design_file import Design
+from design.stability.characteristic_roots import unstable_roots
 from design.stability.margins import Margins
 from experiments.engine.simulate import Run
 from experiments.runs.metrics import last_saturation
@@ -61,8 +62,7 @@ def stability_text(linear: Linear) -> str:
     """Whether the loop around the true plant is stable without limits."""
     if not linear.unstable:
         return ""
-    roots = "a root" if linear.unstable == 1 else f"{linear.unstable} roots"
-    return f"The loop without limits is UNSTABLE: {roots} in the right half plane."
+    return f"The loop without limits is UNSTABLE: {unstable_roots(linear.unstable)}."
 
 
 def design_rows(design: Design) -> Rows:

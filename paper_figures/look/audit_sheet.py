@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from design.design_file import Design
-from design.stability.characteristic_roots import roots_right_of
+from design.stability.characteristic_roots import roots_right_of, unstable_roots
 from design.stability.margins import delay_loop
 from identification.base.errors import InputError
 from paper_figures.look.nyquist import draw_nyquist
@@ -33,5 +33,5 @@ def _instability(design: Design) -> str:
     try:
         count = roots_right_of(delay_loop(design, design.loop_plant), 0.0)
     except InputError:
-        return ": a root of the loop is on the imaginary axis as far as rounding shows"
-    return f": UNSTABLE, {count} root{'s' if count > 1 else ''} in the right half plane" if count else ""
+        return ": a root of the loop is on the imaginary axis, within rounding errors"
+    return f": UNSTABLE, {unstable_roots(count)}" if count else ""

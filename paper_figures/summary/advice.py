@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pandas as pd
 
 from design.design_file import Design
-from design.stability.characteristic_roots import roots_right_of
+from design.stability.characteristic_roots import roots_right_of, unstable_roots
 from design.stability.margins import delay_loop
 from identification.model.model_file import IdentifiedModel
 from identification.model.signals import Signals
@@ -87,8 +87,7 @@ def _unusable(delay_free: Design) -> str:
     count = roots_right_of(delay_loop(delay_free, delay_free.plant), 0.0) if late else 0
     if not count:
         return ""
-    roots = f"{count} root{'s' if count > 1 else ''} in the right half plane"
-    return f"with the plant's dead time of {duration(late)} its loop is unstable ({roots})"
+    return f"with the plant's dead time of {duration(late)} its loop is unstable ({unstable_roots(count)})"
 
 
 def _limits(tracking: pd.DataFrame, best: pd.DataFrame | None, signals: Signals, follows: bool) -> str:
@@ -108,7 +107,7 @@ def _limits(tracking: pd.DataFrame, best: pd.DataFrame | None, signals: Signals,
         if follows:
             return f"The limits {within} suffice for this reference: {takes}{used}; {reached}."
         asked = f"but from rest the loop asks for up to {with_unit(unsaturated, unit)}"
-        return f"The limits {within} would suffice: {takes}{used}; {asked}, and its output does not come to follow."
+        return f"The limits {within} would suffice: {takes}{used}; {asked}, and its output does not follow."
     forced = 0.0 if best is None else float(best["periodic_lower"].iloc[0])
     leaves = f": each leaves an error of {with_unit(forced, signals.output_unit)} or more" if forced > 0 else ""
     remedy = f" to {number(100 / share, 2)} % of its size, or widen the limits {number(share)} times"

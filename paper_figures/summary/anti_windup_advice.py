@@ -21,7 +21,7 @@ def use(design: Design, found: Found, signals: Signals) -> Iterator[str]:
     best = best_anti_windup(found)
     controller = "Use the controller of design.json"
     if best == "none":
-        yield f"{controller} without anti-windup: with none of those that were run does the loop do better."
+        yield f"{controller} without anti-windup: none of those that were run improves the loop."
     elif best == "corrected":
         promise = _promise(design, found.made.get("tracking"), signals)
         yield f"{controller} with the anti-windup 'corrected': {promise}."
@@ -53,7 +53,7 @@ def _nothing_follows(found: Found) -> str:
         return f"{said}, nor with a reference {SMALLER[-1]:g} times smaller; look for a slower reference."
     return (
         f"{said}. With a reference {number(multiple)} times smaller, or limits{wide} {number(multiple)} times wider, "
-        "one does; a slower reference asks less, too."
+        "one does; so may a slower reference."
     )
 
 
@@ -113,8 +113,8 @@ def _promise(design: Design, tracking: pd.DataFrame | None, signals: Signals) ->
     if of_run(tracking, "corrected", "slews") == 1:
         return (
             f"in the run under the reference the loop recovers {when(of_run(tracking, 'corrected', 'recovery_s'))}; "
-            f"nothing is guaranteed, since the actuator is held back by its rate limit of {slope} in this run, and a "
-            "guarantee is of limits alone"
+            f"nothing is guaranteed, since the rate limit of {slope} acts in this run and the guarantee covers "
+            "saturation limits alone"
         )
     return (
         f"{_within_limits(design, tracking, signals)}. The rate limit of {slope} is never reached in the run under the "

@@ -106,7 +106,7 @@ def _runs(tracking: pd.DataFrame, signals: Signals, from_file: bool) -> Table:
     head = (
         "run",
         "last at a limit [s]",
-        f"most asked for{asked}",
+        f"largest control{asked}",
         f"error at the end{left}",
         "of half the reference's range [%]" if from_file else "of the amplitude [%]",
     )

@@ -152,7 +152,7 @@ def test_the_record_of_a_text(exceptions: pd.DataFrame):
     [
         ("name,pattern\n", "the columns are name, pattern"),
         (",".join(EXCEPTION_COLUMNS) + "\na,line,x,y\n", "line 2: scope is 'line'"),
-        (",".join(EXCEPTION_COLUMNS) + "\na,text,(,y\n", "line 2: '(' is no regular expression"),
+        (",".join(EXCEPTION_COLUMNS) + "\na,text,(,y\n", "line 2: '(' is not a regular expression"),
         (",".join(EXCEPTION_COLUMNS) + "\nquoted,text,x,y\n", "line 2: an exception is named quoted"),
     ],
 )
@@ -165,7 +165,8 @@ def test_bad_exceptions_are_refused(content: str, part: str, tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("content", "part"), [("{", "line 1: "), ("[]", "expected an object"), ("{}", "with text_sha")]
+    ("content", "part"),
+    [("{", "line 1: "), ("[]", "expected an object"), ("{}", "the members are none; expected text_sha")],
 )
 def test_bad_records_are_refused(content: str, part: str, tmp_path: Path):
     path = tmp_path / "coverage.json"

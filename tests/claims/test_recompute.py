@@ -134,10 +134,10 @@ def test_ledger_with_other_columns_is_refused(tmp_path: Path):
     ("lines", "part"),
     [
         ([""], "the columns are none"),
-        ([",".join(COLUMNS)], "no rows below"),
+        ([",".join(COLUMNS)], "holds a header and no rows"),
         ([",".join(COLUMNS), "a,b"], "line 2: 2 cells; expected 11"),
         ([",".join(COLUMNS), 'a,"b'], "line 2: unexpected end of data"),
-        ([",".join(COLUMNS), "a,,,1,,,,,,,", "a,,,1,,,,,,,"], "the id a stands twice"),
+        ([",".join(COLUMNS), "a,,,1,,,,,,,", "a,,,1,,,,,,,"], "the id a occurs twice"),
         (
             [",".join(COLUMNS), "a,,,1,,,os:getcwd,,,,"],
             "compute of a is 'os:getcwd'; expected experiments.module:function",
@@ -193,7 +193,7 @@ def test_two_outputs_of_one_path_are_refused(small_ledger: Path):
     path = small_ledger / ".." / small_ledger.name / "claims.csv"
     result = CliRunner().invoke(main, ["thesis", "claims", "--output", str(small_ledger), "--page", str(path)])
     assert result.exit_code == 2
-    assert "two of these are one file" in result.output
+    assert "two of these outputs are the same file" in result.output
     assert not list(small_ledger.iterdir())
 
 

@@ -389,7 +389,7 @@ def test_caption_counts_the_lines_above_the_bound(above):
     tables = additive_error_tables()
     tables["additive_error"].loc[: above - 1, "error"] = 1e6
     caption = figure_module("fig_2_09").caption(tables)
-    assert ("at every line" if above == 0 else "but for 2 lines") in caption
+    assert ("at every line" if above == 0 else "except at 2 lines") in caption
     assert "2 of the tests are SYNTHETIC" in caption
     tables["additive_error_summary"]["synthetic_tests"] = 0
     assert "SYNTHETIC" not in figure_module("fig_2_09").caption(tables)
@@ -703,10 +703,10 @@ def test_the_campaign():
     assert over_distance.get_ylim() == peak.get_xlim()
     caption = fig_a_06.caption(tables)
     for said in (
-        "SYNTHETIC: 120 plants that we drew within W_a (seed 17), under the limits +-13.5",
-        "known to +-0.12 with 95 % confidence",  # sqrt(log(40)/240)
-        "without anti-windup 62.5 %, half within 4 s; thesis 50 %; corrected",
-        "Linear loops stable: 62.5 %.",
+        "SYNTHETIC: the loop of chapter 4 with 120 plants drawn within W_a (seed 17), limits +-13.5",
+        "+-0.12 with 95 % confidence",  # sqrt(log(40)/240)
+        "without anti-windup 62.5 % (half within 4 s); thesis 50 %; corrected",
+        "Without limits 62.5 % of the loops are stable.",
     ):
         assert said in caption
 
@@ -978,7 +978,7 @@ def test_missing_column_is_one_sentence_with_its_file(name, table, column, tmp_p
 def test_key_error_that_is_no_column_is_not_called_one(tmp_path, monkeypatch):
     monkeypatch.delitem(style.LINES, "reference")
     result = drawn(tmp_path, "fig_2_14", tables_of("fig_2_14"))
-    assert "fig_2_14 cannot be drawn of delay_free, delay_free_summary in" in result.output
+    assert "fig_2_14 cannot be drawn from delay_free, delay_free_summary in" in result.output
     assert "'reference'" in result.output
     assert "no column" not in result.output
 
@@ -987,7 +987,7 @@ def test_key_error_that_is_no_column_is_not_called_one(tmp_path, monkeypatch):
     ("damage", "said"),
     [
         (lambda table: table.assign(time_s="fast"), "'fast' in the column time_s; expected a number or nothing"),
-        (lambda table: table.iloc[:1], "fig_2_14 cannot be drawn of delay_free, delay_free_summary in"),
+        (lambda table: table.iloc[:1], "fig_2_14 cannot be drawn from delay_free, delay_free_summary in"),
         (lambda table: table.assign(time_s=np.nan), "cannot be drawn"),
     ],
 )
@@ -1003,7 +1003,7 @@ def test_table_without_rows_is_refused(tmp_path):
     tables = tables_of("fig_2_14")
     result = drawn(tmp_path, "fig_2_14", tables | {"delay_free": tables["delay_free"].iloc[:0]})
     assert result.exit_code == 2
-    assert result.output.startswith(f"Error: {tmp_path / 'delay_free'}.csv: no rows")
+    assert result.output.startswith(f"Error: {tmp_path / 'delay_free'}.csv: holds a header and no rows")
 
 
 def test_summary_without_a_run_is_refused(tmp_path):

@@ -13,6 +13,7 @@ from functools import cache
 from itertools import combinations
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -35,6 +36,9 @@ FULL = 0.9
 """Of the points of a table, or of the pixel columns if they are fewer, so many are drawn in what is seen."""
 STRAIGHT, TURN = 0.12, 10.0
 """Two pieces of a line longer than this share of the panel that turn by more degrees make a polygon."""
+PASSES, BESIDE, SWING = 6.0, 5.0, 0.06
+"""A line that goes so many times up or down its range in so many points of the page is a smear; a range of a smaller
+share of the panel only makes it look broader."""
 NARROW = 5.0
 """Pixels: a narrower peak is one."""
 TOUCHING = 1.0
@@ -117,6 +121,43 @@ def test_a_line_has_a_point_in_every_pixel_column_for_which_there_is_one(name: s
                     assert len(drawn) >= FULL * min(len(shown), pixels), (
                         f"{line} shows {len(drawn)} of {len(shown)} points in {pixels:.0f} columns"
                     )
+
+
+def passes(panel: Axes, points: np.ndarray) -> float:
+    """How often a line goes up or down its range within a strip of the panel, at most; a small range does not count."""
+    (x, y), (low, high) = points[np.isfinite(points).all(axis=1)].T, panel.bbox.intervaly
+    y = np.clip(y, low, high)
+    strip = np.floor(x / (BESIDE * panel.figure.dpi / 72)).astype(int)
+    starts = np.flatnonzero(np.diff(strip, prepend=strip[:1] - 1))
+    swing = np.maximum.reduceat(y, starts) - np.minimum.reduceat(y, starts)
+    travel = np.add.reduceat(np.abs(np.diff(y, append=y[-1])) * (np.diff(strip, append=strip[-1]) == 0), starts)
+    large = swing > SWING * (high - low)
+    return float(np.max(travel[large] / swing[large], initial=0.0))
+
+
+@each_figure
+def test_no_line_is_a_smear(name: str) -> None:
+    for panel in panels(name):
+        for line, points in curves(panel):
+            if is_joined(line):
+                assert passes(panel, points) < PASSES, f"{line} goes up and down {passes(panel, points):.0f} times"
+
+
+def test_a_line_that_swings_fast_is_a_smear_unless_its_range_is_drawn() -> None:
+    """Twenty swings fill a strip; of a sinusoid of few cycles a strip holds part of one."""
+    time = pd.Series(np.linspace(0, 1, 20001))
+    with style.styled():
+        _, (raw, drawn, slow) = plt.subplots(3)
+        fast = np.sin(2000 * np.pi * time)
+        raw.plot(time, fast)
+        looks.draw(drawn, time, [looks.Trace(fast, style.LINES["model"], "y")], 1.0)
+        slow.plot(time, np.sin(20 * np.pi * time))
+        found = [
+            max((passes(panel, points) for _, points in curves(panel)), default=0.0) for panel in (raw, drawn, slow)
+        ]
+        plt.close()
+    assert found[0] > PASSES
+    assert max(found[1:]) < PASSES / 2
 
 
 @each_figure

@@ -177,7 +177,7 @@ W_a = 0.3 (1 + s/40) / (1 + 2 0.2 s/60 + (s/60)^2)
 It is 3.25 times the largest of these distances on average and 12.5 times at most; no bound of this order gets
 below 11.7 times
 It touches day_0.csv at 55.5 rad/s
-run last at a limit [s] most asked for [mA]
+run last at a limit [s] largest control [mA]
 without anti-windup 3.12 12.5 0.875 1.5
 anti-windup corrected 3.12 12.5 0.125 1.5
 """
@@ -368,7 +368,7 @@ def test_what_the_fit_leaves_is_said():
         tests=tuple(replace(test, median_distance=0.25) for test in fit.tests),
         misfit=fit.noise,
         cautions=(
-            "a median distance of 25 % is more than noise leaves",
+            "noise does not explain a median distance of 25 %",
             "the data show no dead time",
             f"{tests[0].name}: the plant misses the line at 2 Hz",
         ),
@@ -384,7 +384,7 @@ def test_what_the_fit_leaves_is_said():
     for part in (
         "differ by no more: tests of one plant would differ as much with a probability of 0.5",
         "No other structure was tried. The deviance is divided by 19.5",
-        "A median distance of 25 % is more than noise leaves.",
+        "Noise does not explain a median distance of 25 %.",
         f"The data show no dead time. {tests[0].name}: the plant misses",
         "the intervals are widened for it",
         "finds 2 of their 4 modes, with omega within 2.5 % and zeta within 50 % of the fit.",
@@ -507,7 +507,7 @@ def test_the_anti_windup_is_the_one_whose_run_recovers():
 def test_a_rate_limit_that_acts_leaves_no_guarantee_and_is_blamed_for_what_stays():
     slow = tracking().assign(rate_limit=30.0, slews=1)
     said = advised(found_of(tracking=slow))["Do"]
-    assert "held back by its rate limit of 30 mA/s in this run, and a guarantee is of limits alone" in said
+    assert "since the rate limit of 30 mA/s acts in this run and the guarantee covers saturation limits alone" in said
     assert "guaranteed to return" not in said
     never = advised(found_of(tracking=slow.assign(slews=0)))["Do"]
     assert "guaranteed to return" in never

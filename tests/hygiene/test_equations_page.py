@@ -184,7 +184,7 @@ def test_only_docstring_and_comments_say_a_label() -> None:
     [
         ("label,title", "labels,title", "the columns are labels, title"),
         ("(2.18),", "2.18,", "label of row 31, 2.18, is '2.18'; expected (2.18), Lemma 2 or Fig. 2.6"),
-        ("(2.18),", "(2.17),", "(2.17) stands twice"),
+        ("(2.18),", "(2.17),", "(2.17) occurs twice"),
         (
             "design.anti_windup.compensator:second_order",
             "second_order",

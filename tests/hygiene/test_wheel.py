@@ -90,7 +90,7 @@ def test_the_wheel_works_from_any_folder(tree: Path, tmp_path: Path) -> None:
         refused = run(python, "-m", "design", "extended", "implied", *ASKED, "--output", output, cwd=folder)
         assert (refused.returncode, refused.stderr) == (
             2,
-            f"Error: implied: no such file, nor can it be one of the thesis's sets, which {folder / name} hides\n",
+            f"Error: implied: no such file, and another package 'data' ({folder / name}) hides the thesis's sets\n",
         )
     done = run(python, "-m", "design", "extended", mine.name, *ASKED, "--output", output, cwd=folder)
     assert done.returncode == 0, done.stderr
@@ -130,6 +130,6 @@ def test_a_missing_extra_is_one_sentence(
     refused = CliRunner().invoke(main, arguments)
     assert refused.exit_code == 2
     assert refused.stderr.splitlines()[-1] == (
-        f'Error: {missing} is not installed, which this command needs; give pip install "antiwindup-thesis[campaign]"'
+        f'Error: this command needs {missing}, which is not installed; run pip install "antiwindup-thesis[campaign]"'
     )
     assert {path.name for path in tmp_path.iterdir()} == {"design.json"}

@@ -148,7 +148,7 @@ def short_trade_off(design: Design) -> dict[str, pd.DataFrame]:
 
 
 def short_hidden_modes(design: Design) -> dict[str, pd.DataFrame]:
-    """Those of Fig. A.9 for a minute and a half instead of an hour."""
+    """Those of Fig. A.9 for a minute and a half instead of a quarter of an hour."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(hidden_modes, "PERIODS", 20)
         return hidden_modes_tables(design)

@@ -83,7 +83,9 @@ def test_a_loop_that_diverges_or_is_refused_is_a_result(extended_design: Design)
     assert not isinstance(fourth, InputError)
 
 
-@pytest.mark.parametrize(("limits", "workers", "message"), [([12.0, 0.0], 1, "limit is 0"), ([12.0], 0, "0 workers")])
+@pytest.mark.parametrize(
+    ("limits", "workers", "message"), [([12.0, 0.0], 1, "limit is 0"), ([12.0], 0, "workers is 0")]
+)
 def test_bad_arguments_are_refused_at_once(
     extended_design: Design, limits: list[float], workers: int, message: str
 ) -> None:

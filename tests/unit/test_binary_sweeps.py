@@ -139,7 +139,7 @@ EXPECTED = (
         ({"omega": "text", "response": RESPONSE}, f": the variables are 'omega (char)', 'response'; {EXPECTED}"),
         (
             {"Omega": 1, "response": 1j},
-            ": 'Omega' does not say which quantity in which unit; expected --columns \"Omega=omega\"",
+            ": 'Omega' does not name a quantity with a unit; expected --columns \"Omega=omega\"",
         ),
         (
             {"omega": 1, "response": 1j, "Test": 1},
@@ -147,17 +147,17 @@ EXPECTED = (
         ),
         (
             {"f": 1, "mag": 1, "phase": 1},
-            ": 'f', 'mag', 'phase' do not say which quantity in which unit; expected --columns "
+            ": 'f', 'mag', 'phase' do not name a quantity with a unit; expected --columns "
             '"f=frequency_hz,mag=magnitude_db,phase=phase_deg", or omega, or magnitude, or phase_rad',
         ),
         (
             {"data": {"freq": 1, "frf": 1j}},
-            ": 'data.freq', 'data.frf' do not say which quantity in which unit; expected --columns "
+            ": 'data.freq', 'data.frf' do not name a quantity with a unit; expected --columns "
             '"data.freq=frequency_hz,data.frf=response", or omega',
         ),
         (
             {"t": 1, "u": 1, "y": 1},
-            ": 't', 'u', 'y' do not say which quantity in which unit; expected --columns "
+            ": 't', 'u', 'y' do not name a quantity with a unit; expected --columns "
             '"t=time_s,u=input,y=output", or input_held',
         ),
         (

@@ -303,7 +303,7 @@ def test_a_place_that_is_taken_is_refused_before_anything_is_done(refit: Refit, 
     place = tmp_path / "mine" / ("results/" + name if "refused" in name else name)
     place.parent.mkdir(parents=True)
     place.write_text("mine", encoding="utf-8")
-    with pytest.raises(InputError, match=r"is there already.*--force"):
+    with pytest.raises(InputError, match=r"exists already.*--force"):
         refit()
     assert len(built(tmp_path)) == 1
     assert place.read_text(encoding="utf-8") == "mine"
@@ -346,7 +346,7 @@ def test_a_manifest_that_leads_out_of_the_folder_is_refused(refit: Refit, tmp_pa
     (tmp_path / "mine").mkdir()
     listed = {"schema": 1, "files": {name: {"source": "", "content": None}}}
     (tmp_path / "mine" / "manifest.json").write_text(json.dumps(listed), encoding="utf-8")
-    with pytest.raises(InputError, match=r"manifest\.json: '.*' leads out of the folder"):
+    with pytest.raises(InputError, match=r"manifest\.json: '.*' lies outside the folder"):
         refit()
     assert (tmp_path / "outside.txt").read_text(encoding="utf-8") == "mine"
 
@@ -379,7 +379,7 @@ def test_what_a_killed_build_had_begun_is_replaced_if_it_is_ours(refit: Refit, t
     with (mine / ".antiwindup.journal").open("a", encoding="utf-8") as journal:
         journal.write('["cut off by the ki')
     (mine / "design.json").write_text("mine", encoding="utf-8")
-    with pytest.raises(InputError, match=r"design\.json: is there already, written by somebody else"):
+    with pytest.raises(InputError, match=r"design\.json: exists already and is not an output of this program"):
         refit()
     assert built(tmp_path)["design.json"] == "mine"
     (mine / "design.json").unlink()
@@ -408,7 +408,7 @@ def test_a_link_in_the_place_of_an_output_is_not_followed(refit: Refit, tmp_path
         figure.symlink_to(target)
         (tmp_path / "a.csv").write_text("b", encoding="utf-8")
         before = own.read_bytes()
-        with pytest.raises(InputError, match=r"bode\.pdf: is there already"):
+        with pytest.raises(InputError, match=r"bode\.pdf: exists already"):
             refit()
         assert own.read_bytes() == before
         assert not (tmp_path / "nowhere").exists()
@@ -485,7 +485,7 @@ def test_what_somebody_puts_into_a_place_while_a_build_runs_is_refused_and_left(
         return ""
 
     monkeypatch.setattr(antiwindup.build, "code_of", code_of)
-    with pytest.raises(InputError, match=r"compare\.csv: is there already"):
+    with pytest.raises(InputError, match=r"compare\.csv: exists already"):
         refit()
     assert figure.read_text(encoding="utf-8") == "precious notes"
 
@@ -530,7 +530,7 @@ SWEEP = Path(__file__).resolve().parents[2] / "data" / "elevation" / "synthetic_
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (["refit", str(SWEEP), "--output", ""], "--output is ''; expected a folder for the outputs alone"),
+        (["refit", str(SWEEP), "--output", ""], "--output is ''; expected a folder that holds nothing but the outputs"),
         (["refit", str(SWEEP), "--output", "/"], "--output is '/'; expected a folder"),
         (["refit", str(SWEEP), "--output", "root"], "--output is 'root'; expected a folder"),  # a link to /
         (["refit", str(SWEEP), "--output", "a\nb"], r"'a\nb': holds a line break"),

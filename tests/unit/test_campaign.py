@@ -231,7 +231,7 @@ def whole(folder: Path) -> bytes:
         patch.setattr(checkpoint, "CHUNK", 2)
         result = run(folder, "whole.parquet")
     assert result.exit_code == 0, result.output
-    assert result.stdout.startswith("No guarantee speaks of all plants within W_a\n16 plants within W_a ->")
+    assert result.stdout.startswith("No guarantee holds for all plants within W_a\n16 plants within W_a ->")
     assert [line.split()[0] for line in result.stdout.splitlines()[-3:]] == ["none", "thesis", "corrected"]
     return (folder / "whole.parquet").read_bytes()
 
@@ -317,13 +317,13 @@ def test_what_a_scheduler_that_dies_leaves_goes_on_without_it(
     assert left.returncode == 2
     (sentence,) = left.stderr.splitlines()
     assert "the cluster gave up (" in sentence
-    assert sentence.endswith("; the same command goes on from what is done")
+    assert sentence.endswith("; the same command continues from there")
     there = 2 * len(list(parts.glob("part-*.parquet")))
     assert 4 <= there < PLANTS
 
     refused = run(folder, "left.parquet", "--seed", "2")
     assert refused.exit_code == 2
-    assert "parts of another campaign, seed 1 and not 2; give the same command to go on" in refused.stderr
+    assert "parts of another campaign, seed 1 and not 2; give the same command as then" in refused.stderr
     manifest = parts / "manifest.json"
     known = manifest.read_text(encoding="utf-8")
     facts = json.loads(known)

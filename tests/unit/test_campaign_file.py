@@ -111,7 +111,7 @@ def test_a_part_with_any_bit_changed_runs_again(campaign: Campaign, design: Path
         damaged[place] ^= 1 << rng.integers(8)
         part.write_bytes(damaged)
         assert CampaignFile(file.output, campaign, PLANTS, design).missing == [(0, 2)]
-    with pytest.raises(InputError, match="has been changed meanwhile; give the same command"):
+    with pytest.raises(InputError, match="was changed during the run; give the same command"):
         file.finish()
     assert not file.output.exists()
     again, alone = kept(file.output, campaign, design), kept(tmp_path / "alone.parquet", campaign, design)
@@ -150,7 +150,7 @@ def test_what_is_no_part_of_the_campaign_stays_and_is_named(design: Path, tmp_pa
     foreign.write_text("half", encoding="utf-8")
     result = run(design, 1, output)
     assert result.exit_code == 0
-    assert f"{foreign.parent} stays, since it holds {foreign.name}" in result.stderr
+    assert f"{foreign.parent} is kept, since it holds {foreign.name}" in result.stderr
     assert [path.name for path in foreign.parent.iterdir()] == [foreign.name]
 
 

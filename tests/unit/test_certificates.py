@@ -384,7 +384,7 @@ def test_no_unit_of_time_input_or_output_changes_the_interval(
 
 def test_refusals() -> None:
     slow = PlantModel(1.0, (), (), 0.0, 0, (), (1e-15,))
-    with pytest.raises(InputError, match="too slow beside the period"):
+    with pytest.raises(InputError, match="a pole of the plant is too slow"):
         periodic_limit(slow, sinusoid(1.0, 1.0, 0.0, 0.0), 1e-3)
     with pytest.raises(InputError, match="has the slope 2 a second; expected a periodic one"):
         periodic_limit(PlantModel(1.0, (), (), 0.0), Reference((1.0,), (1.0,), (0.0,), 0.0, 2.0), 1.0)

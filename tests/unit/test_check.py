@@ -139,7 +139,7 @@ def test_a_plant_that_did_not_move_passes(model: IdentifiedModel, design: Design
     )
     assert {each.outcome for each in answers(found)} == {Outcome.HOLDS}
     assert first_sentence(found) == (
-        "Nothing to do: every sweep lies within W_a but for noise, no parameter moved by more than chance, "
+        "Nothing to do: every sweep lies within W_a except for noise, no parameter moved by more than chance, "
         "the design keeps its margins and its guarantee"
     )
 
@@ -184,7 +184,7 @@ def test_the_scatter_of_the_tests_does_not_explain_a_single_line(scattering: Ide
     told, sentence = asked(check_model(scattering, [replace(test, response=response)]), "within W_a")
     assert told is Outcome.MOVED
     hertz = OMEGA[70] / (2 * np.pi)
-    assert sentence.endswith(f"; the line at {hertz:.4g} Hz is none of a plant with the model's structure")
+    assert sentence.endswith(f"; no plant with the model's structure meets the line at {hertz:.4g} Hz")
 
 
 def test_a_test_of_the_model_touches_the_bound_at_most(model: IdentifiedModel, design: Design) -> None:
@@ -299,7 +299,7 @@ def test_a_loop_that_is_not_stable_is_not_to_be_run(model: IdentifiedModel, desi
     found = check_model(model, [measured(late, 2)], design)
     assert first_sentence(found).startswith("Do not run this design: ")
     assert asked(found, "margins")[1].startswith("the loop is NOT stable with the new plant (the loop has ")
-    assert asked(found, "guarantee") == (Outcome.LOST, "nothing is guaranteed of a loop that is not stable")
+    assert asked(found, "guarantee") == (Outcome.LOST, "an unstable loop has no guarantee")
 
 
 @pytest.mark.parametrize(("height", "is_told"), [(0.0, False), (0.1, True)])
@@ -309,7 +309,7 @@ def test_a_resonance_of_its_own_is_told(model: IdentifiedModel, height: float, i
     test = measured(PLANT, 1)
     outcome, sentence = asked(check_model(model, [replace(test, response=test.response * extra)]), "parameters")
     assert (outcome is Outcome.MOVED) == is_told
-    assert ("the sweep shows what the model's structure does not have, near 1" in sentence) == is_told  # of 19 Hz
+    assert ("the sweep shows dynamics that the model's structure lacks, near 1" in sentence) == is_told  # of 19 Hz
 
 
 def test_few_scattered_tests_do_not_tell_that_nothing_moved(model: IdentifiedModel) -> None:
@@ -324,9 +324,9 @@ def test_few_scattered_tests_do_not_tell_that_nothing_moved(model: IdentifiedMod
     assert 12 * stats.norm.sf(errors) < LEVEL / 2 < 12 * stats.t.sf(errors, 2)
     outcome, sentence = asked(check_model(scattered, [sweep]), "parameters")
     assert outcome is Outcome.OPEN
-    assert re.match(r"3 tests are too few to tell whether a parameter moved: the gain differs by \+\d\d % ", sentence)
+    assert re.match(r"3 tests are too few to show whether a parameter moved: the gain differs by \+\d\d % ", sentence)
     least = np.expm1(stats.t.isf(LEVEL / 24, 2) * 0.03 * np.sqrt(4 / 3))
-    told = re.search(r"only a move of (\d+) % or more could be told", sentence)
+    told = re.search(r"only a move of (\d+) % or more can be detected", sentence)
     assert told is not None
     assert float(told[1]) == pytest.approx(100 * least, rel=0.1)
 
@@ -383,19 +383,20 @@ def test_a_model_without_a_fit_is_compared_with_its_bound_alone(
     bare.write_text(replace(model, fit=None, standard_errors=None).to_json(), encoding="utf-8")
     status, said = check(bare, bench / "same.csv")
     assert status == 0
-    assert said.startswith("Nothing to do: the sweep lies within W_a; not told: parameters\n")
+    assert said.startswith("Nothing to do: the sweep lies within W_a; unknown: parameters\n")
     status, said = check(bare, bench / "a|b <&>\x07.csv")
     assert (status, "MOVED" in said, "could show whether the plant moved" in said) == (1, False, True)
 
 
 @pytest.mark.parametrize("change", [{"tests": []}, {"band": [0.0, 9.0]}, {"band": [9.0]}])
-def test_a_fit_that_does_not_say_where_it_was_made_is_none(
+def test_a_fit_that_does_not_say_where_it_was_made_is_refused(
     bench: Path, tmp_path: Path, change: dict[str, list[float]]
 ) -> None:
     content = json.loads((bench / "model.json").read_text(encoding="utf-8"))
     content["fit"] |= {"tests": [each | change for each in content["fit"]["tests"]]} | change
     (tmp_path / "model.json").write_text(json.dumps(content), encoding="utf-8")
-    assert read_model(tmp_path / "model.json").fit is None
+    with pytest.raises(InputError, match=f"'{next(iter(change))}' is .*of 'fit', which may be left out"):
+        read_model(tmp_path / "model.json")
 
 
 @pytest.mark.parametrize(
@@ -403,7 +404,7 @@ def test_a_fit_that_does_not_say_where_it_was_made_is_none(
     [
         ({"model": "nowhere.json"}, "nowhere.json: no such file"),
         ({"design": "model.json"}, "schema is 1; expected 3"),
-        ({"design": "other.json"}, "the design is of another model, its plant is not the model's"),
+        ({"design": "other.json"}, "the design's plant is not that of the model"),
         ({"sweep": "elsewhere.csv"}, "has lines from 3183.1 to 50929.6 Hz; expected some from 3.1831 to 50.9296 Hz"),
         (
             {"sweep": "narrow.csv"},

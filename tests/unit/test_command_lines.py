@@ -110,10 +110,10 @@ def test_design_refuses_bad_plants(runner: CliRunner, tmp_path: Path, member: st
         (["delay-free", "implied", "--reference-hz", "-0.25", *EPSILON], "expected one or more positive numbers"),
         (["delay-free", "implied", "--reference-hz", "nan", *EPSILON], "expected one or more positive numbers"),
         (["delay-free", "implied", "--reference-hz", "0.25", "--epsilon", "99"], "epsilon"),
-        (["delay-free", "implied", "--reference-hz", "0.25"], "of --epsilon and --integral-action none is given"),
+        (["delay-free", "implied", "--reference-hz", "0.25"], "neither --epsilon nor --integral-action is given"),
         (
             ["delay-free", "implied", "--reference-hz", "0.25", *EPSILON, "--integral-action"],
-            "both are given; expected one",
+            "both --epsilon and --integral-action are given; expected one",
         ),
         (
             ["delay-free", "implied", "--reference-hz", "0.25", "--reference-hz", "0.25", *EPSILON],
@@ -269,7 +269,7 @@ def test_simulate_stops_at_until(runner: CliRunner, tmp_path: Path, extended_jso
         ({"--limit": "nan"}, "--limit is nan"),
         ({"--until": "0"}, "--until is 0"),
         ({"--sample-time": "2"}, "sample time <= until"),
-        ({"--until": "inf"}, "both finite"),
+        ({"--until": "inf"}, "until < inf"),
         ({"--gamma": "5", "--anti-windup": "corrected"}, "--gamma belongs to --anti-windup thesis"),
         ({"--alpha": "-1"}, "expected alpha > 0"),
         ({"--amplitude": "nan"}, "expected finite numbers"),

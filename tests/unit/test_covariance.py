@@ -94,10 +94,10 @@ def test_it_is_kept_with_the_standard_errors_on_its_diagonal() -> None:
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"noise": [[1.0, 0.0]]}, "'noise' is no matrix of 2 rows of 2 numbers"),
+        ({"noise": [[1.0, 0.0]]}, "'noise' is not a matrix; expected 2 rows of 2 numbers"),
         ({"misfit": [[1.0, "x"], [0.0, 1.0]]}, "expected a number"),
-        ({"freedom": 0}, "'freedom' is 0 and 'count' 2; expected 1 or more"),
-        ({"count": 1}, "2 tests where they scatter"),
+        ({"freedom": 0}, "'freedom' is 0 and 'count' 2; expected at least 1"),
+        ({"count": 1}, "expected at least 1 and 2"),
     ],
 )
 def test_what_is_no_covariance_is_refused(wrong: dict[str, object], said: str) -> None:

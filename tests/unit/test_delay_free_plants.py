@@ -166,7 +166,7 @@ def test_what_a_constant_disturbance_at_the_input_does(name: str, integral_actio
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"integrators": -2}, "has 2 zeros at s = 0, so that a constant input leaves no output"),
+        ({"integrators": -2}, "has 2 zeros at s = 0, so that no bounded input holds a constant output"),
         ({"integrators": -1}, "has a zero at s = 0, so that"),
         ({"real_zeros": (-3.5,)}, "a zero in the right half plane, at 3.5 rad/s"),
         ({"zero_modes": (Mode(5.0, -0.6),)}, r"a zero in the right half plane, at 3 \+- 4j rad/s"),

@@ -45,6 +45,12 @@ def test_its_help_shows_every_default(words: tuple[str, ...]) -> None:
             assert f"[default: {default}" in text or f"default: {default}]" in text, option.name
 
 
+@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
+def test_the_list_of_commands_shows_its_whole_first_sentence(words: tuple[str, ...]) -> None:
+    """click cuts what is longer than 45 characters, and ends it in three dots."""
+    assert not COMMANDS[words].get_short_help_str().endswith("...")
+
+
 @pytest.mark.parametrize("group", [(), ("identification",), ("design",), ("experiments", "thesis"), ("paper_figures",)])
 def test_every_group_says_its_version(group: tuple[str, ...]) -> None:
     assert CliRunner().invoke(main, [*group, "--version"]).output.endswith(f"version {version('antiwindup-thesis')}\n")

@@ -277,7 +277,7 @@ def test_of_the_values_that_come_while_it_works_only_the_newest_is_worked_on() -
     ("words", "said"),
     [
         (["--output", "{design}"], "is an input too; expected another file"),
-        (["--port", "{port}"], "which cannot be had (Address already in use); expected a free one"),
+        (["--port", "{port}"], "which cannot be used (Address already in use); expected a free one"),
         (["--limit", "3", "-3"], "--limit is 3 -3; expected the lower limit first"),
         (["--limit", "inf"], "limit is -inf; expected a finite number"),
         (["--phase", "1"], "no --amplitude is given; expected one for each frequency of the design, 1.5 rad/s"),
@@ -319,5 +319,5 @@ def test_without_its_extra_the_command_says_what_to_install(
         refused = CliRunner().invoke(main, ["explore", str(tmp_path / "design.json"), "--no-browser", "--port", port])
     assert refused.exit_code == 2
     assert refused.stderr == (
-        'Error: bokeh is not installed, which this command needs; give pip install "antiwindup-thesis[explore]"\n'
+        'Error: this command needs bokeh, which is not installed; run pip install "antiwindup-thesis[explore]"\n'
     )

@@ -38,7 +38,7 @@ def test_another_process_is_named_and_its_end_frees_the_lock(lock: Lock, tmp_pat
         assert other.stdout is not None
         assert other.stdout.readline() == "held\n"
         (tmp_path / "link").symlink_to(target)
-        said = f"process {other.pid} on {platform.node()} is writing it; expected none, wait for its end"
+        said = f"process {other.pid} on {platform.node()} is writing it; wait until that ends"
         for name in ("out", "link"):
             with pytest.raises(InputError, match=said), lock(tmp_path / name):
                 pass
@@ -130,6 +130,9 @@ def test_what_is_no_lock_is_refused_and_left(tmp_path: Path, make: Callable[[Pat
     own = tmp_path / ".antiwindup.lock"
     make(own)
     before = own.lstat()
-    with pytest.raises(InputError, match=r"\.antiwindup\.lock: is no lock of this project"), locked_folder(tmp_path):
+    with (
+        pytest.raises(InputError, match=r"\.antiwindup\.lock: is not a lock file of this project"),
+        locked_folder(tmp_path),
+    ):
         pass
     assert (own.lstat().st_ino, own.lstat().st_size) == (before.st_ino, before.st_size)

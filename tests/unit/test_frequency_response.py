@@ -164,7 +164,7 @@ UNIFORM = "expected about 0.07 (uniform sampling, within 5 % of an interval), or
             [",".join("abcdefghijklmnop") + "q" * 50],
             ", line 1: the columns are 'a', 'b', 'c', 'd', 'e', 'f', 'g', 'h', 'i', 'j', 'k', 'l' and 4 more; " + KINDS,
         ),
-        (["frequency_hz,real,imag,real"], ", line 1: 'real' comes twice among the columns; expected it once"),
+        (["frequency_hz,real,imag,real"], ", line 1: the columns hold 'real' twice; expected it once"),
         (
             ["frequency_hz,omega,real,imag"],
             ", line 1: the columns hold both 'frequency_hz' and 'omega'; expected one of them",

@@ -81,7 +81,7 @@ def test_constant_weights_unstable_pole_and_zero(w1: float, w2: float, p: float,
     G, known = Block(2.0, (z,), (p,)), pick_optimum(w1, w2, p, z)
     _, found = mixed_sensitivity(G, Block(w1), Block(w2), 0.0)
     brackets(found, known)
-    assert found.reason.startswith("no stable T meets its 2 conditions: Pick's matrix has a pivot of -")
+    assert found.reason.startswith("no stable T meets the 2 interpolation conditions: a pivot of Pick's matrix is -")
     assert nehari_optimum(G, Block(w1), Block(w2), 2.0, 128) == pytest.approx(known, rel=1e-8)
 
 

@@ -128,7 +128,9 @@ def test_the_held_plant_is_its_pulse_response(delay: float) -> None:
 
 
 def test_what_it_is_not_for_is_refused(delay_free_design: Design, extended_design: Design) -> None:
-    with pytest.raises(InputError, match="method matched is for an extended design"):
+    with pytest.raises(InputError, match="method is 'matched', for an extended design"):
         simulate_sampled(delay_free_design, sinusoid(1.0, 1.5), None, Drive(100.0, "matched", FREE), 1.0)
-    with pytest.raises(InputError, match=r"rate is 0.4 Hz and the reference has 0.238732 Hz; expected more than twice"):
+    with pytest.raises(
+        InputError, match=r"rate is 0.4 Hz and the reference has 0.238732415 Hz; expected more than twice"
+    ):
         simulate_sampled(extended_design, sinusoid(1.0, 1.5), None, Drive(0.4, "matched", FREE), 10.0)

@@ -88,7 +88,7 @@ def test_missing_table_is_refused(folders, figure_of_table):
 @pytest.mark.parametrize("text", ["", "# only a comment\n", 't,y\n0,0,0\n1,"2\n'])
 def test_malformed_table_is_refused(folders, figure_of_table, text):
     (folders[0] / "step.csv").write_text(text, encoding="utf-8")
-    assert_refused(run(folders, "fig_9_99"), "step.csv: not a table")
+    assert_refused(run(folders, "fig_9_99"), "step.csv: is not a table")
     assert written(folders) == []
 
 

@@ -242,17 +242,17 @@ def test_table_of_the_start_from_rest_falls_and_is_finest_where_it_falls() -> No
 @pytest.mark.parametrize(
     ("plant", "reference", "limit", "words"),
     [
-        (PlantModel(-2.0, (), (), 0.1, 0), CHAPTER_4, 1.0, "the plant is the gain -2, whose least error"),
+        (PlantModel(-2.0, (), (), 0.1, 0), CHAPTER_4, 1.0, "the plant is a constant gain of -2, whose least error"),
         (PlantModel(1.0, (), (Mode(5.0, -0.1),), 0.0, 0), CHAPTER_4, 1.0, "of real part 0.5 rad/s; expected none"),
         (integrator(1.0), CHAPTER_4, (2.0, -3.0), "limits are 2 and -3; expected the lower one first"),
         (integrator(1.0), CHAPTER_4, (0.0, 3.0), "limits are 0 and 3, between which a plant with an integ"),
-        (integrator(1.0), sinusoid(1.0, 0.0, 1.57, 1.0), 1.0, "a constant alone"),
-        (PlantModel(2.0, (), (), 0.0, 0, (), (4.0,)), sinusoid(3.0, 0.0, 1.57), 1.0, "control, of size 1.5, allow"),
+        (integrator(1.0), sinusoid(1.0, 0.0, 1.57, 1.0), 1.0, "the reference is a constant"),
+        (PlantModel(2.0, (), (), 0.0, 0, (), (4.0,)), sinusoid(3.0, 0.0, 1.57), 1.0, "steady control of 1.5"),
         (integrator(1.0), Reference((1.0, 1.0), (2.0, 3.0), (0.0, 0.0), 0.0), 1.0, "frequencies 2, 3 rad/s"),
         (integrator(1.0), CHAPTER_4, 0.0, "the saturation limit is 0; expected a positive number"),
         (integrator(1.0), CHAPTER_4, math.inf, "limits are -inf and inf; expected finite ones"),
         (integrator(1.0), CHAPTER_4, math.nan, "the saturation limit is nan"),
-        (PlantModel(1.0, (), (), 0.0, 1, (), (1e9,)), CHAPTER_4, 1.0, "1e\\+09 rad/s, is too fast beside"),
+        (PlantModel(1.0, (), (), 0.0, 1, (), (1e9,)), CHAPTER_4, 1.0, "1e\\+09 rad/s, is too fast for"),
     ],
 )
 def test_refusals(plant: PlantModel, reference: Reference, limit: float | tuple[float, float], words: str) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -57,7 +59,7 @@ def test_json_there_and_back() -> None:
     ("change", "sentence"),
     [
         ({"integrators": 3}, "integrators is 3; expected an integer from -2 to 2"),
-        ({"integrators": True}, "integrators is True"),
+        ({"integrators": True}, "'integrators' is True"),
         ({"real_zeros": 3.0}, "'real_zeros' is 3.0; expected a list of numbers"),
         ({"real_poles": [0.0]}, "real_poles is 0; expected any other number"),
         ({"real_poles": ["2"]}, "'real_poles' is '2'; expected a number"),
@@ -75,14 +77,33 @@ def test_a_bound_needs_a_pole() -> None:
         AdditiveBound(1.0, (), ())
 
 
-def test_a_model_whose_fit_says_less_is_read(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"fit": "x"}, "'fit' is 'x'; expected an object (of 'fit', which may be left out)"),
+        ({"fit": {"source": "identification fit"}}, "'intervals_95' is None; expected an object (of 'fit', which"),
+        ({"standard_errors": [1.0]}, "'standard_errors' is [1.0]; expected an object (of 'standard_errors', which"),
+        ({"schema": True}, "schema is True; expected 1"),
+    ],
+)
+def test_a_model_is_read_whole_or_refused(change: dict[str, Any], sentence: str, tmp_path: Path) -> None:
     path, bound = tmp_path / "model.json", AdditiveBound.printed_form(1.0, 2.0, 3.0, 0.1)
     model = IdentifiedModel(PLANT, bound, tuple(float(k) for k in range(len(PLANT.parameters))))
     path.write_text(model.to_json(), encoding="utf-8")
     assert read_model(path) == model
-    content = json.loads(path.read_text(encoding="utf-8"))
-    content["fit"] = {"source": "identification fit", "structure": "1 integrator"}
+    path.write_text(json.dumps(json.loads(model.to_json()) | change), encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(f"{path}: {sentence}")):
+        read_model(path)
+
+
+def test_standard_errors_are_of_the_plants_shape(tmp_path: Path) -> None:
+    path, bound = tmp_path / "model.json", AdditiveBound.printed_form(1.0, 2.0, 3.0, 0.1)
+    content = json.loads(IdentifiedModel(PLANT, bound, (1.0,) * len(PLANT.parameters)).to_json())
     del content["standard_errors"]["zero_modes"][0]
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(InputError, match="the numbers of modes and real roots are"):
+        read_model(path)
+    del content["standard_errors"]
     path.write_text(json.dumps(content), encoding="utf-8")
     assert read_model(path) == IdentifiedModel(PLANT, bound)
 

@@ -61,9 +61,7 @@ def test_the_robust_condition_by_its_closed_form(searched: bool) -> None:
 def test_where_x_reaches_one_half_nothing_is_left() -> None:
     shape = rational(Block(0.6, (), (-1 + 0j,)))
     for given in (shape, dataclasses.replace(shape, rational=None)):
-        with pytest.raises(
-            InputError, match=r"\|W_a C S\| reaches 0\.6 at (0|0\.001) rad/s; a robust guarantee expects"
-        ):
+        with pytest.raises(InputError, match=r"\|W_a C S\| reaches 0\.6 at (0|0\.001) rad/s; expected less than 1/2"):
             PositiveReal(given)
 
 
@@ -215,11 +213,11 @@ def scaled(rows: Rows, factor: float) -> Rows:
     ("changes", "sentence"),
     [
         ({"certificate": lambda rows: scaled(rows, 1.1)}, r"does not meet P A\^-1 b = -\(C A\^-1\)'"),
-        ({"certificate": lambda rows: rows[:2]}, "is no symmetric matrix; expected one with 3 rows"),
-        ({"certificate": lambda _: None}, "'global' has either a sector or a certificate that is not its"),
+        ({"certificate": lambda rows: rows[:2]}, "is not a symmetric matrix; expected one with 3 rows"),
+        ({"certificate": lambda _: None}, "is 'global'; expected a certificate and no sector beside it"),
         ({"certificate": lambda _: 5}, "'certificate' is 5; expected a list of rows"),
         ({"guarantee": lambda _: "all"}, "guarantee is 'all'; expected one of global, robust, sector"),
-        ({"guarantee": lambda _: "sector"}, "'sector' has either a sector or a certificate that is not its"),
+        ({"guarantee": lambda _: "sector"}, "is 'sector'; expected a sector and no certificate beside it"),
     ],
 )
 def test_a_file_whose_certificate_proves_nothing_is_refused(
@@ -270,7 +268,7 @@ def test_the_command_takes_a_guarantee(tmp_path: Path) -> None:
     options += ["--output", str(output), "--guarantee"]
     refused = CliRunner().invoke(main, [*options, "robust"])
     assert refused.exit_code == 2
-    assert "|W_a C S| reaches 8.84 at 175 rad/s; a robust guarantee expects less than 1/2" in refused.output
+    assert "|W_a C S| reaches 8.84 at 175 rad/s; expected less than 1/2 for a robust guarantee" in refused.output
     assert not output.exists()
     result = CliRunner().invoke(main, [*options, "robust", "--robust-level", "0.3"])
     assert result.exit_code == 0, result.output

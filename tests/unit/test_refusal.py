@@ -52,8 +52,8 @@ def write(output: Path) -> None:
     ("how", "sentence"),
     [
         ("refused", "the sweep is empty; expected numbers"),
-        ("singular", "the numbers given are too extreme to compute with (Singular matrix)"),
-        ("overflow", "the numbers given are too extreme to compute with (overflow encountered in exp)"),
+        ("singular", "the given numbers are too large or too small to compute with (Singular matrix)"),
+        ("overflow", "the given numbers are too large or too small to compute with (overflow encountered in exp)"),
     ],
 )
 def test_a_refusal_is_one_sentence_and_status_2(how: str, sentence: str) -> None:

@@ -71,12 +71,12 @@ def test_a_reference_from_a_file(command: str, design_json: Path, reference_csv:
 def test_no_guarantee_is_claimed_of_an_actuator_that_does_more_than_saturate(command: str, design_json: Path) -> None:
     """The control crosses the limits in far less than the 24 s that this actuator takes from one to the other."""
     said = invoke(command, design_json, "--rate-limit", "1").output
-    assert "No guarantee: the actuator was too slow for the control, and a guarantee is of limits alone" in said
+    assert "No guarantee: the rate limit acted, and the guarantee covers saturation limits alone" in said
     assert "within it" not in said
     assert "too slow" not in invoke(command, design_json).output
     if command == "sampled":
         said = invoke(command, design_json, "--quantum", "5").output
-        assert "No guarantee: the actuator rounds the control, and a guarantee is of limits alone" in said
+        assert "No guarantee: the actuator has levels, and the guarantee covers saturation limits alone" in said
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -87,9 +87,7 @@ def test_a_constant_is_its_amplitude_and_never_0_by_its_phase(
     design_json.write_text(constant.to_json(), encoding="utf-8")
     asked = ["--amplitude", "3", "--amplitude", "0"]
     zero = invoke(command, design_json, *asked, "--phase", "0", "--phase", "0")
-    refused(
-        zero, design_json, "frequency 0 has the phase 0, with which it is 0 at all times", "expected the phase pi/2"
-    )
+    refused(zero, design_json, "frequency 0 has the phase 0, which makes it 0 at all times", "expected pi/2")
     assert set(written(invoke(command, design_json, *asked), design_json)["reference"]) == {3.0}
 
 
@@ -160,9 +158,9 @@ def test_sampled_without_limits(design_json: Path) -> None:
     [
         (["--rate", "0"], "the rate is 0 Hz"),
         (["--rate", "nan"], "the rate is nan Hz"),
-        (["--rate", "1e12"], "rows are asked for"),
+        (["--rate", "1e12"], "rows; expected at most"),
         (["--until", "nan"], "the run lasts nan s"),
-        (["--until", "inf"], "rows are asked for"),
+        (["--until", "inf"], "rows; expected at most"),
         (["--until", "0.001"], "expected a finite time of one sample"),
         (["--limit", "-1"], "--limit is -1"),
         (["--quantum", "-1"], "the quantum is -1"),
@@ -238,7 +236,7 @@ def test_a_rate_limit(design_json: Path) -> None:
     result = invoke("simulate", design_json, "--rate-limit", "40", "--phase", "1")
     table = written(result, design_json)
     assert np.abs(np.diff(table["saturated_control"])).max() == pytest.approx(0.4, rel=1e-9)
-    assert "No guarantee: the actuator was too slow" in result.stdout
+    assert "No guarantee: the rate limit acted" in result.stdout
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -29,8 +29,8 @@ MODEL, DESIGN = (
     json.loads((ROOT / file).read_text(encoding="utf-8"))
     for file in ("identification/model/model.schema.json", "design/design.schema.json")
 )
-OTHER_TYPES = (None, "text", 7.5, {})
-DERIVED = "said"  # what the writer makes of its neighbours and no reader reads
+OTHER_TYPES = (None, "text", 7.5, True, {})
+ABSURD = (1e300, -1e300, 1e-300)
 
 Content = dict[str, Any]
 Read = Callable[[Path], IdentifiedModel | Design]
@@ -68,15 +68,7 @@ def documents(fitted: IdentifiedModel) -> dict[str, Content]:
     for name in ("extended", "delay-free"):  # some blocks are enough
         blocks = contents[name]["blocks"]
         contents[name]["blocks"] = {each: blocks[each] for each in ("K", "T_so", "Lambda", "G_A") if each in blocks}
-    return {name: without_derived(content) for name, content in contents.items()}
-
-
-def without_derived(content: Any) -> Any:
-    if isinstance(content, list):
-        return [without_derived(each) for each in content]
-    if not isinstance(content, dict):
-        return content
-    return {key: without_derived(value) for key, value in content.items() if key != DERIVED}
+    return contents
 
 
 def objects_of(content: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
@@ -113,8 +105,10 @@ def mutants(content: Content) -> Iterator[tuple[str, Content]]:
             values: list[Any] = [each for each in OTHER_TYPES if type(each) is not kind]
             if isinstance(value, int) and not isinstance(value, bool):
                 values.append(value + 0.5)
-            elif isinstance(value, float) and path[:1] in (("plant",), ("additive_bound",)):
-                values += [0.0, -value]
+            elif isinstance(value, float):
+                values += ABSURD
+                if path[:1] in (("plant",), ("additive_bound",)):
+                    values += [0.0, -value]
             for other in values:
                 yield f"{name} = {other}", changed(lambda found, key=key, other=other: found.update({key: other}))
                 if isinstance(value, list) and value and not isinstance(other, type(value[0])):
@@ -122,38 +116,30 @@ def mutants(content: Content) -> Iterator[tuple[str, Content]]:
                     yield f"{name}[0] = {other}", changed(lambda found, key=key, new=first: found.update({key: new}))
 
 
-def keeps(written: Any, given: Any) -> bool:
-    """Whether all that was given is in what was written."""
-    if isinstance(given, dict) and isinstance(written, dict):
-        return all(key in written and keeps(written[key], value) for key, value in given.items())
-    if isinstance(given, list) and isinstance(written, list):
-        return len(given) == len(written) and all(map(keeps, written, given))
-    return isinstance(written, bool) == isinstance(given, bool) and bool(written == given)
-
-
-def is_kept(content: Content, read: Read, path: Path) -> bool:
-    """Whether a reader takes a document, and all of it."""
+def is_read(content: Content, read: Read, path: Path) -> bool:
+    """Whether a reader takes a document."""
     path.write_text(json.dumps(content), encoding="utf-8")
     try:
-        return keeps(json.loads(read(path).to_json()), content)
+        read(path)
     except InputError:
         return False
+    return True
 
 
 @pytest.mark.parametrize("name", ["model", "model of a wider bound", "extended", "delay-free"])
-def test_the_schema_takes_what_the_reader_keeps(name: str, documents: Mapping[str, Content], tmp_path: Path) -> None:
-    """And nothing else: a mutant that is read and written again with all that it says, and no other, is valid."""
+def test_the_schema_takes_what_the_reader_takes(name: str, documents: Mapping[str, Content], tmp_path: Path) -> None:
+    """And nothing else, of mutants of each member."""
     content, is_model = documents[name], name.startswith("model")
     schema, read = (MODEL, read_model) if is_model else (DESIGN, read_design)
     validator = Draft202012Validator(schema)
     assert validator.is_valid(content)
-    assert is_kept(content, read, tmp_path / "a.json")
+    assert is_read(content, read, tmp_path / "a.json")
     found = {
-        mutant: (validator.is_valid(changed), is_kept(changed, read, tmp_path / "a.json"))
+        mutant: (validator.is_valid(changed), is_read(changed, read, tmp_path / "a.json"))
         for mutant, changed in mutants(content)
     }
     assert {valid for valid, _ in found.values()} == {True, False}
-    assert [mutant for mutant, (valid, kept) in found.items() if valid != kept] == []
+    assert [mutant for mutant, (valid, taken) in found.items() if valid != taken] == []
 
 
 @pytest.mark.parametrize("change", [{}, {"sector": None}, {"certificate": [[1.0]]}, {"guarantee": "global"}])
@@ -161,7 +147,7 @@ def test_a_sector_takes_the_place_of_a_certificate(change: Content, fitted: Iden
     content = json.loads(design_extended(fitted, [1.5], guarantee="sector").to_json())
     content["anti_windup"]["corrected"] |= change
     assert Draft202012Validator(DESIGN).is_valid(content) == (not change)
-    assert is_kept(content, read_design, tmp_path / "a.json") == (not change)
+    assert is_read(content, read_design, tmp_path / "a.json") == (not change)
 
 
 def test_the_schemas_agree_on_what_both_files_hold() -> None:

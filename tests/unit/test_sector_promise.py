@@ -260,7 +260,7 @@ def test_the_thesiss_compensator_has_no_guarantee(extended_design: Design) -> No
     given_one = guarantee(extended_design, kind)
     assert given_one.sector == 0
     assert "theta2 is not stable" in given_one.missing
-    assert f"circle criterion, {circle_sector(kind.theta1_tilde):.3g}, counts under a reference" in given_one.missing
+    assert f"the circle criterion gives the sector {circle_sector(kind.theta1_tilde):.3g})" in given_one.missing
 
 
 def test_nothing_is_promised_where_the_reference_needs_more_than_the_limits(extended_design: Design) -> None:
@@ -352,7 +352,7 @@ def test_simulate_says_first_whether_its_run_is_covered(
         (
             "45",
             "corrected",
-            "No guarantee on a computer; in continuous time the run would be within it: the run",
+            "No guarantee on a computer; in continuous time it would cover the run: the run",
         ),
         ("400", "corrected", "10001 rows -> "),
         ("12", "thesis", "No guarantee: theta2 is not stable"),
@@ -373,7 +373,7 @@ def test_another_true_plant_has_no_guarantee_here(extended_design: Design, tmp_p
     options = ("--sample-time", "0.01", "--limit", "12", "--anti-windup", "corrected", "--plant")
     text = said("simulate", extended_design, tmp_path, *options, "table")
     assert text.startswith(
-        "No guarantee: the true plant is not within W_a of the design's model, with as many poles in "
+        "No guarantee: the true plant is not within W_a of the model, or has another number of poles "
     )
     assert said("simulate", extended_design, tmp_path, *options, "implied").startswith("NOT covered by its guarantee")
 

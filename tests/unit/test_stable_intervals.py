@@ -298,5 +298,5 @@ def test_a_long_dead_time_is_told_in_digits_that_show_its_margin() -> None:
 
 def test_crossings_and_counts_that_disagree_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stable_intervals, "roots_right_of", lambda *_: 2)
-    with pytest.raises(InputError, match="the argument principle counts 2 unstable roots and the crossings"):
+    with pytest.raises(InputError, match="the argument principle counts 2 unstable roots, the crossings"):
         margins_of(DelayLoop(Block(1.0, (), (0.0,), 0.1), ONE, NONE, 0.0), BOUND)

@@ -296,7 +296,7 @@ def test_a_record_that_is_cut_off_gives_no_lines_where_its_end_hides_the_respons
     estimate = estimate_response(DT, u, held_response(PLANTS["integrator"], DT, u), held=True)
     np.testing.assert_allclose(estimate.response, over_hold(PLANTS["integrator"], DT, estimate.omega), rtol=1e-3)
     said = "; ".join(map(str, estimate.left_out))
-    assert "Hz left out: the response cannot be told there from what the record cuts off at its ends" in said
+    assert "Hz left out: the transients at the ends of the record hide the response" in said
     assert sum(lines.response.size for lines in estimate.left_out) > 50
     assert not any(np.isin(lines.omega, estimate.omega).any() for lines in estimate.left_out)
 
@@ -407,7 +407,7 @@ def test_lines_below_the_first_window_are_named() -> None:
     """A sweep from 0.1 Hz on, in 8 s: none of its lines up to 1 Hz makes a window."""
     u = np.random.default_rng(18).standard_normal(2**13)
     estimate = estimate_response(DT, u, held_response(PLANTS["no integrator, real pole"], DT, u), held=True)
-    assert "8 lines from 0.1221 to 0.9767 Hz left out: nearer to zero than a window of lines is wide" in str(
+    assert "8 lines from 0.1221 to 0.9767 Hz left out: closer to 0 Hz than the width of a window of lines" in str(
         [str(lines) for lines in estimate.left_out]
     )
 
@@ -429,5 +429,5 @@ def test_a_band_that_makes_no_long_window() -> None:
 def test_a_refusal_gives_a_reason_where_no_line_was_left_out() -> None:
     whole = np.full((2, 3), 1.0)
     omega = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    with pytest.raises(InputError, match=r"^6 spectral lines tell .* 9 or more \(a longer record or a wider sweep\)$"):
+    with pytest.raises(InputError, match=r"^6 spectral lines can .* 9 or more \(a longer record or a wider sweep\)$"):
         usable_lines(omega, whole + 0j, 1e-6 * whole, 1e-6 * whole, np.ones(2))

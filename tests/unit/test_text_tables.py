@@ -169,26 +169,26 @@ def test_columns_are_named_by_the_user(tmp_path: Path) -> None:
         (
             "Frequency,Gain,Phase (deg)\n" + POLAR,
             {},
-            ", line 1: the header leaves open whether 'Frequency' is frequency_hz or omega, 'Gain' is magnitude_db or "
-            'magnitude; expected a unit in brackets, or --columns "Frequency=frequency_hz,Gain=magnitude_db" or its '
-            "like",
+            ", line 1: the header does not say whether 'Frequency' is frequency_hz or omega, 'Gain' is magnitude_db or "
+            'magnitude; expected a unit in brackets, or for example --columns "Frequency=frequency_hz,'
+            'Gain=magnitude_db"',
         ),
         (
             "Time,Input (V),Output (V)\n" + CARTESIAN,
             {"Input (V)": "input"},
-            ", line 1: the header leaves open whether 'Time' is time_s or another unit; expected a unit in brackets, "
-            'or --columns "Time=time_s" or its like',
+            ", line 1: the header does not say whether 'Time' is time_s or another unit; expected a unit in brackets, "
+            'or for example --columns "Time=time_s"',
         ),
         (
             "Setup\nFreq(Hz),S11(DB),S11(DEG),S21(DB),S21(DEG)\n" + _rows(F, DB, DEG, DB, DEG),
             {},
-            ", line 2: the columns name 2 responses (s11, s21); expected one, such as by --columns "
+            ", line 2: the columns hold 2 responses (s11, s21); expected one, or for example --columns "
             '"Freq(Hz)=frequency_hz,S11(DB)=magnitude_db,S11(DEG)=phase_deg"',
         ),
         (
             "Frequency (Hz),Gain (dB),Magnitude (dB),Phase (deg)\n" + _rows(F, DB, DB, DEG),
             {},
-            ", line 1: both 'Gain (dB)' and 'Magnitude (dB)' say magnitude_db; expected one, or --columns "
+            ", line 1: both 'Gain (dB)' and 'Magnitude (dB)' mean magnitude_db; expected one, or --columns "
             '"NAME=magnitude_db"',
         ),
         (
@@ -199,8 +199,8 @@ def test_columns_are_named_by_the_user(tmp_path: Path) -> None:
         (
             "# frequency_hz, imag, real\nFrequency,Re(H),Im(H)\n" + CARTESIAN,
             {},
-            ", line 2: the header leaves open whether 'Frequency' is frequency_hz or omega; expected a unit in "
-            'brackets, or --columns "Frequency=frequency_hz" or its like',
+            ", line 2: the header does not say whether 'Frequency' is frequency_hz or omega; expected a unit in "
+            'brackets, or for example --columns "Frequency=frequency_hz"',
         ),
         ("x-axis,1\nsecond,Volt\n" + _rows(F, DB), {}, f", line 1: the columns are 'x-axis', '1'; {KINDS}"),
         ("frequency_hz\x00,real,imag\n" + CARTESIAN, {}, None),
@@ -217,7 +217,9 @@ def test_what_a_header_leaves_open_is_refused_by_name(
 
 
 def test_an_unknown_name_of_ours_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"^--columns: 'hertz' is no name of ours; expected one of coherence, "):
+    with pytest.raises(
+        InputError, match=r"^--columns: 'hertz' is not a name of this program; expected one of coherence, "
+    ):
         _read(tmp_path, "f,real,imag\n" + CARTESIAN, f="hertz")
 
 

@@ -245,5 +245,5 @@ def test_a_dead_time_that_no_plant_within_may_change_stays() -> None:
 
 
 def test_a_bound_that_falls_faster_than_the_plant_is_refused() -> None:
-    with pytest.raises(InputError, match="falls faster than the plant"):
+    with pytest.raises(InputError, match=r"falls faster than \|P\| as omega grows"):
         PlantsWithin(PlantModel(1.0, (), (), 0.01), AdditiveBound(1.0, (), modes(1, 5.0, 1.0)))

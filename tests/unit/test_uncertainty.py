@@ -264,7 +264,7 @@ def test_what_is_not_finite_never_passes(value: float) -> None:
 
 def test_a_bound_that_misses_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MARGIN", -1e-3)
-    with pytest.raises(InputError, match="leave no digits for a bound; expected other units"):
+    with pytest.raises(InputError, match=r"W_a misses a residual by rounding errors \(.*\); expected other units"):
         bound_residuals(PLANT, _tests(FLAT))
 
 

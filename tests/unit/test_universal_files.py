@@ -134,7 +134,7 @@ OTHER_ABSCISSA = ", data set 2: the abscissa is another than that of data set 1;
             f": holds no frequency response but time responses 'Input', 'force'; {EXPECTED_58}",
         ),
         ([FRF, INPUT, OUTPUT], ": holds frequency responses and records of input and output; expected one of them"),
-        ([INPUT, OUTPUT, OUTPUT], ": holds 1 inputs and 2 outputs; expected as many"),
+        ([INPUT, OUTPUT, OUTPUT], ": holds 1 inputs and 2 outputs; expected equal numbers"),
         ([FRF | {"data": RESPONSE.real}], ", data set 1: the values are real; expected complex ones"),
         ([INPUT | {"data": 1j * SWEEP}, OUTPUT], ", data set 1: the values are complex; expected real ones"),
         (

@@ -30,7 +30,7 @@ def test_what_the_work_refuses_is_said() -> None:
 
 
 def test_a_process_that_is_killed_is_said() -> None:
-    with pytest.raises(WorkersLostError, match="a process that computed was killed"):
+    with pytest.raises(WorkersLostError, match="a worker process was killed"):
         gathered(os._exit, [1])
 
 

@@ -16,7 +16,10 @@ from identification.base.path_types import INPUT_FILE, OUTPUT_FILE, OUTPUT_FOLDE
 @click.option("--output", type=OUTPUT_FOLDER, required=True, help="Existing folder to write claims.csv to.")
 @click.option("--page", type=OUTPUT_FILE, help="Write the page to this Markdown file.")
 def claims_command(output: Path, page: Path | None) -> None:
-    """Compute every claim of the thesis again: claims.csv, and a page to read."""
+    """Compute every claim of the thesis again.
+
+    The command writes claims.csv, and with --page a page that shows each verdict.
+    """
     from experiments.thesis.claims.coverage import EXCEPTIONS, RECORD, quotes_sha256, read_exceptions, read_record
     from experiments.thesis.claims.ledger import LEDGER, read_ledger, recompute
     from experiments.thesis.claims.page import claims_page
@@ -40,9 +43,10 @@ def claims_command(output: Path, page: Path | None) -> None:
 @click.argument("text", type=INPUT_FILE)
 @click.option("--record", type=OUTPUT_FILE, help="Write the counts to this JSON file.")
 def coverage_command(text: Path, record: Path | None) -> None:
-    """List the numbers in the thesis's TEXT that no claim quotes.
+    """List the numbers of TEXT without a claim.
 
-    The exit status is 1 if there is one, or if a quote is not in TEXT."""
+    TEXT is the text of the thesis. The exit status is 1 if there is such a number, or if a quote is not in TEXT.
+    """
     from experiments.thesis.claims.coverage import (
         EXCEPTIONS,
         LEFT,
@@ -73,7 +77,10 @@ def coverage_command(text: Path, record: Path | None) -> None:
 @click.command("equations")
 @click.option("--page", type=OUTPUT_FILE, required=True, help="Write the page to this Markdown file.")
 def equations_command(page: Path) -> None:
-    """Write a page with each equation, lemma, theorem, table and figure, its function and its test."""
+    """Write the page of the thesis's equations.
+
+    It has each equation, lemma, theorem, table and figure with its function and its test.
+    """
     from experiments.thesis.claims.equations_page import EQUATIONS, equations_page, read_equations
 
     table = read_equations()

@@ -52,7 +52,7 @@ def read_exceptions(path: Path = EXCEPTIONS) -> pd.DataFrame:
         try:
             re.compile(pattern)
         except re.error as error:
-            raise InputError(f"{path}, line {line}: {shown(pattern)} is no regular expression ({error})") from None
+            raise InputError(f"{path}, line {line}: {shown(pattern)} is not a regular expression ({error})") from None
     return exceptions
 
 
@@ -137,7 +137,7 @@ def read_record(path: Path = RECORD) -> dict[str, Any]:
     """
     content = read_object(path)
     if list(content) != list(RECORDED):
-        raise InputError(f"{path}: expected an object with {', '.join(RECORDED)}")
+        raise InputError(f"{path}: the members are {', '.join(content) or 'none'}; expected {', '.join(RECORDED)}")
     return content
 
 

@@ -66,7 +66,7 @@ def read_equations(path: Path = EQUATIONS) -> pd.DataFrame:
                 )
     twice = table["label"][table["label"].duplicated()]
     if len(twice):
-        raise InputError(f"{path}: {twice.iloc[0]} stands twice; expected every label once")
+        raise InputError(f"{path}: {twice.iloc[0]} occurs twice; expected every label once")
     return table
 
 

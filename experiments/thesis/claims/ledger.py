@@ -37,7 +37,7 @@ def read_ledger(path: Path = LEDGER) -> pd.DataFrame:
     ledger = read_cells(path, COLUMNS)
     twice = ledger["id"][ledger["id"].duplicated()]
     if len(twice):
-        raise InputError(f"{path}: the id {twice.iloc[0]} stands twice; expected every id once")
+        raise InputError(f"{path}: the id {twice.iloc[0]} occurs twice; expected every id once")
     for name, compute in ledger[["id", "compute"]].itertuples(index=False):
         if compute and not re.fullmatch(FUNCTION, compute):
             raise InputError(

@@ -102,7 +102,7 @@ def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: fl
     """
 
     if required == 0:
-        raise InputError("a constant reference takes no control in the steady state; expected a limit (--limit)")
+        raise InputError("a constant reference needs no steady control, from which no limit follows; expected --limit")
 
     def last(limit: float) -> float:
         time = last_saturation(simulate(loop, (-limit, limit), np.array([0.0, horizon_s])))
@@ -111,15 +111,15 @@ def limit_for_last_saturation(loop: SaturatedLoop, target_s: float, required: fl
     low, high = required, 2 * required
     if last(low) <= target_s:
         raise InputError(
-            f"at {low:.4g}, the least limit that lets the loop follow, it leaves saturation before {target_s:g} s; "
-            "expected a slower loop, or a limit of your own (--limit)"
+            f"even with the least limit that allows tracking, {low:.4g}, saturation ends before {target_s:g} s; "
+            "expected a slower loop, or --limit"
         )
     while last(high) > target_s:
         low, high = high, 2 * high
         if high > 64 * required:
             raise InputError(
-                f"no limit up to {high:.4g} lets the loop leave saturation within {target_s:g} s; "
-                "expected a plant and a design that follow the reference"
+                f"saturation does not end within {target_s:g} s with any limit up to {high:.4g}; expected a plant and "
+                "a design that follow the reference"
             )
     while high - low > 1e-6 * high:
         middle = (low + high) / 2

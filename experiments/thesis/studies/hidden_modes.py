@@ -19,8 +19,8 @@ from experiments.thesis.studies.chapter_4 import usual_limit
 from identification.base.errors import InputError
 
 # Our choices, in units of the design: the thesis has no computer.
-PERIODS = 860  # of the reference: an hour of the thesis's
-MOST_SAMPLES = 4_000_000  # beyond which the run has fewer periods
+PERIODS = 215  # of the reference: a quarter of an hour of the thesis's
+MOST_SAMPLES = 1_000_000  # beyond which the run has fewer periods
 SAMPLES = 2 + 2 * math.sqrt(5)  # in a period of the fastest root of the controller
 BITS = 16  # of the computer's numbers: 2^BITS steps from limit to limit
 FIRST = 0.1  # of a period, before which nothing has grown that can be seen
@@ -72,7 +72,7 @@ def hidden_modes_tables(
     if limit is None:
         limit = usual_limit(design)
     if not math.isfinite(limit):
-        raise InputError(f"the limit is {limit:g}; expected a finite one, whose range the computer's numbers divide")
+        raise InputError(f"the limit is {limit:g}; expected a finite one, whose range fixes the resolution")
     rate_hz = SAMPLES * fastest_root(*design.controller_parts()) / (2 * math.pi)
     period_s = span(design, reference)
     duration_s = min(PERIODS * period_s, MOST_SAMPLES / rate_hz)

@@ -60,7 +60,7 @@ def sampled_rates_tables(design: Design, limit: float | None = None) -> dict[str
     if limit is None:
         limit = usual_limit(design)
     if not math.isfinite(limit):
-        raise InputError(f"the limit is {limit:g}; expected a finite one, whose range a converter divides")
+        raise InputError(f"the limit is {limit:g}; expected a finite one, whose range fixes the resolution")
     root = fastest_root(*design.controller_parts())
     shown = usual_rates(design)[SHOWN]
     facts = {

@@ -23,7 +23,7 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the caption with the numbers of the tables."""
     table, summary = tables["additive_error"], tables["additive_error_summary"]
     above = int((table["error"] > table["bound"]).sum())
-    verdict = "at every line" if not above else f"but for {above} lines"
+    verdict = "at every line" if not above else f"except at {above} lines"
     synthetic = int(only(summary, "synthetic_tests"))
     origin = (
         f" {synthetic} of the tests are SYNTHETIC: a program made them. They show that the method works, and say "

@@ -24,12 +24,12 @@ def caption(tables: Mapping[str, pd.DataFrame]) -> str:
     summary = tables["campaign_summary"]
     plants = int(only(summary, "plants"))
     return (
-        f"SYNTHETIC: {plants} plant{'s' if plants > 1 else ''} that we drew within W_a (seed "
-        f"{int(only(summary, 'seed'))}), under the limits {of_limits(summary)}. (a) to (c) The share of the plants up "
-        f"to a value, known to +-{number(band(plants), 2)} with {number(100 * (1 - UNSURE))} % confidence. Runs that "
-        "diverge or never recover count, so a line may end below 1. Recovered, |e| within 1 % of the amplitude: "
-        f"{_outcomes(summary)}. (d) The errors of (a) over the distance |P_true - P|/|W_a|. Linear loops stable: "
-        f"{_percent(only(summary, 'linear_stable'))}."
+        f"SYNTHETIC: the loop of chapter 4 with {plants} plant{'s' if plants > 1 else ''} drawn within W_a "
+        f"(seed {int(only(summary, 'seed'))}), limits {of_limits(summary)}. (a) to (c) The share of plants up to each "
+        f"value, +-{number(band(plants), 2)} with {number(100 * (1 - UNSURE))} % confidence; a line ends below 1 where "
+        "runs diverge or do not recover. Plants whose |e| settles within 1 % of the amplitude: "
+        f"{_outcomes(summary)}. (d) The errors of (a) over |P_true - P|/|W_a|. Without limits "
+        f"{_percent(only(summary, 'linear_stable'))} of the loops are stable."
     )
 
 
@@ -38,7 +38,7 @@ def _outcomes(summary: pd.DataFrame) -> str:
     said = []
     for name, label in SAID.items():
         recovered, time_s = (of_run(summary, name, column) for column in ("recovered", "recovery_50_s"))
-        after = "" if math.isnan(time_s) else f", half within {number(time_s)} s"
+        after = "" if math.isnan(time_s) else f" (half within {number(time_s)} s)"
         said.append(f"{label} {_percent(recovered)}{after}")
     return "; ".join(said)
 

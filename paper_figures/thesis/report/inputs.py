@@ -157,7 +157,7 @@ def read_inputs(
     texts = {table: read(paths[table], f"results/{table}.csv") for table in wanted}
     for table, text in texts.items():
         if len(text.splitlines()) < 2:
-            raise InputError(f"{paths[table]}: no rows below the names of the columns")
+            raise InputError(f"{paths[table]}: holds a header and no rows; expected one or more")
     texts["claims"] = read(build / "claims.csv", "claims.csv")
     ledger = _ledger(texts["claims"], build / "claims.csv")
     files += [build / "figures" / f"{name}.{kind}" for name in figures for kind in ("svg", "txt")]
@@ -218,20 +218,20 @@ def _ledger(text: str, path: Path) -> pd.DataFrame:
     try:
         ledger = pd.read_csv(StringIO(text), dtype=str, keep_default_na=False)
     except (pd.errors.ParserError, pd.errors.EmptyDataError):
-        raise InputError(f"{path}: not a table of comma-separated values") from None
+        raise InputError(f"{path}: is not a table of comma-separated values") from None
     lacking = [column for column in LEDGER if column not in ledger.columns]
     if lacking:
         raise InputError(
             f"{path}: no column {', '.join(lacking)}; expected what 'python -m experiments thesis claims' writes"
         )
     if ledger.empty:
-        raise InputError(f"{path}: no rows below the names of the columns")
+        raise InputError(f"{path}: holds a header and no rows; expected one or more")
     for column in ("computed", "tolerance"):
         cells = ledger[column][ledger[column] != ""]
         if (words := cells[pd.to_numeric(cells, errors="coerce").isna()]).any():
             raise InputError(f"{path}: {shown(words.iloc[0])} in the column {column}; expected a number or nothing")
     if (again := ledger["id"][ledger["id"].duplicated()]).any():
-        raise InputError(f"{path}: the id {again.iloc[0]} stands in several rows; expected each once")
+        raise InputError(f"{path}: the id {again.iloc[0]} occurs in several rows; expected each once")
     return ledger
 
 
