@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -65,6 +66,8 @@ LONGEST = (
 
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each of the hundreds of processes compiles all modules again
 sys.dont_write_bytecode = False
+# A shell starts its background jobs with SIGINT ignored, which every command that a test starts would take over.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 gc.disable()  # while modules are imported and tests collected: all that is made then stays
 
 
