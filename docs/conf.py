@@ -67,6 +67,7 @@ nb_merge_streams = True
 # docstrings
 add_module_names = False
 autodoc_typehints = "none"
+autodoc_use_type_comments = False
 viewcode_follow_imported_members = False  # else the way back from the source of a room's face is lost
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False

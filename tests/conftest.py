@@ -66,9 +66,8 @@ LONGEST = (
 
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each of the hundreds of processes compiles all modules again
 sys.dont_write_bytecode = False
-signal.signal(
-    signal.SIGINT, signal.default_int_handler
-)  # a shell's background job ignores it, and so would all commands
+# A shell's background job ignores Ctrl-C, and so would every command that a test starts.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 gc.disable()  # while modules are imported and tests collected: all that is made then stays
 
 

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from itertools import cycle
 from pathlib import Path
 
@@ -66,14 +65,6 @@ def long_run(design: Design) -> tuple[object, tuple[float, float], np.ndarray]:
     return design_loop(design, reference, "thesis"), (-9.0, 9.0), np.array([0.0, 2e4])
 
 
-@pytest.fixture
-def answering() -> Iterator[None]:
-    """Python as it answers Ctrl-C by itself, also where the tests run in the background."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 def interrupt_soon() -> float:
     """Interrupt the first thread as Ctrl-C does, in a while; the time when."""
     first = threading.main_thread().ident
@@ -82,7 +73,6 @@ def interrupt_soon() -> float:
     return time.monotonic() + 0.3
 
 
-@pytest.mark.usefixtures("answering")
 def test_ctrl_c_stops_a_run(extended_design: Design) -> None:
     """In a notebook; uninterrupted it would take half a minute."""
     simulate(*long_run(extended_design)[:2], np.array([0.0, 0.1]))  # type: ignore[arg-type]  # compiled now
@@ -96,7 +86,6 @@ def test_ctrl_c_stops_a_run(extended_design: Design) -> None:
     assert threading.active_count() <= before
 
 
-@pytest.mark.usefixtures("answering")
 def test_ctrl_c_stops_many_runs(extended_design: Design) -> None:
     runs = simulate_many(
         extended_design,
