@@ -280,7 +280,7 @@ def _finish(design: Design, model: str, output: Path, summary: str) -> None:
     for name, each in design.anti_windup.items():
         judged = each.judgement
         sector = "any" if judged.popov_sector is None else lower_end(judged.popov_sector, 4)
-        stable = "stable" if judged.theta2_stable else "NOT stable: saturation leaves an offset for ever"
+        stable = "stable" if judged.theta2_stable else "NOT stable: saturation leaves a lasting offset"
         click.echo(f"  anti-windup {name:9s} f = {judged.f:.4g}, Popov sector {sector}, theta2 {stable}")
     click.echo(f"  guarantee of the corrected one: {design.corrected.guarantee}, {design.corrected.guarantee_said}")
 
@@ -291,11 +291,9 @@ def _on_the_plant_with_its_dead_time(design: Design) -> str:
 
     if not design.plant.delay_s:
         return ""
-    count = roots_right_of(delay_loop(design, design.plant), 0.0)
+    count, late = roots_right_of(delay_loop(design, design.plant), 0.0), f"{design.plant.delay_s:g} s"
     found = f"UNSTABLE ({unstable_roots(count)}): use the command extended" if count else "stable too"
-    return (
-        f"\n  with the plant's dead time of {design.plant.delay_s:g} s, which this design ignores, the loop is {found}"
-    )
+    return f"\n  with the plant's dead time of {late}, which this design ignores, the loop is {found}"
 
 
 if __name__ == "__main__":

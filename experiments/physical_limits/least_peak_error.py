@@ -248,6 +248,7 @@ def finite_limits(plant: PlantModel, limits: float | Sequence[float]) -> tuple[f
         raise InputError(f"the saturation limits are {low:g} and {high:g}; expected finite ones")
     if plant.integrators > 0 and not low < 0 < high:
         raise InputError(
-            f"the saturation limits are {low:g} and {high:g}; expected 0 between them for a plant with an integrator"
+            f"the saturation limits are {low:g} and {high:g}; expected a negative and a positive one for a plant "
+            "with an integrator"
         )
     return low, high

@@ -245,7 +245,7 @@ def test_table_of_the_start_from_rest_falls_and_is_finest_where_it_falls() -> No
         (PlantModel(-2.0, (), (), 0.1, 0), CHAPTER_4, 1.0, "the plant is a constant gain of -2, whose least error"),
         (PlantModel(1.0, (), (Mode(5.0, -0.1),), 0.0, 0), CHAPTER_4, 1.0, "of real part 0.5 rad/s; expected none"),
         (integrator(1.0), CHAPTER_4, (2.0, -3.0), "limits are 2 and -3; expected the lower one first"),
-        (integrator(1.0), CHAPTER_4, (0.0, 3.0), "limits are 0 and 3, between which a plant with an integ"),
+        (integrator(1.0), CHAPTER_4, (0.0, 3.0), "limits are 0 and 3; expected a negative and a positive one for"),
         (integrator(1.0), sinusoid(1.0, 0.0, 1.57, 1.0), 1.0, "the reference is a constant"),
         (PlantModel(2.0, (), (), 0.0, 0, (), (4.0,)), sinusoid(3.0, 0.0, 1.57), 1.0, "steady control of 1.5"),
         (integrator(1.0), Reference((1.0, 1.0), (2.0, 3.0), (0.0, 0.0), 0.0), 1.0, "frequencies 2, 3 rad/s"),
