@@ -54,14 +54,16 @@ def files(controller: SampledController, run: CheckRun, precision: str = "double
     def table(values: Iterable[float]) -> str:
         return "\n".join(f"    {line}" for line in wrap(", ".join(map(number, values)), WIDTH, break_on_hyphens=False))
 
+    smallest = float(np.finfo(kind).tiny)
     for limit in controller.limits:
-        if 0 < abs(limit) < float(np.finfo(kind).tiny):
+        if 0 < abs(limit) < smallest:
             raise InputError(f"the controller has the limit {limit:g}, which no {precision} holds; expected another")
 
     environment = templates(number=number, rows=table, comment=_comment)
     content = {
         "c": controller,
         "real": precision,
+        "smallest": smallest,
         "samples": np.column_stack([run.reference, run.measurement, run.control, run.command]).tolist(),
         "input": given,
         "output": seen,

@@ -151,5 +151,6 @@ def commands(
         control[k] = u_0 - own * u_tilde
         p_T[:, k] += d_T * v
         p_w[0, k] += d_w[1] * u_tilde
-        x_K, x_T, x_w = rows(A_K, x_K) + b_K * e, rows(A_T, x_T) + b_T * v, rows(A_w, x_w) + b_w * u_tilde
+        following = rows(A_K, x_K) + b_K * e, rows(A_T, x_T) + b_T * v, rows(A_w, x_w) + b_w * u_tilde
+        x_K, x_T, x_w = (np.where(np.abs(x) < np.finfo(kind).tiny, kind(0), x) for x in following)
     return control, np.clip(control, low, high)

@@ -102,6 +102,20 @@ def test_it_equals_the_sampled_loop_to_the_last_bit(case: Case) -> None:
         assert case.compiled.logged == (u, 0)
 
 
+def test_it_does_so_where_states_decay_below_the_normal_numbers(case: Case) -> None:
+    controller, random = case.controller, np.random.default_rng(3)
+    assert controller.limits[0] <= 0 <= controller.limits[1]
+    times = np.arange(0, 800, 40) / controller.rate_hz
+    asked = SampledReference(np.repeat(times, 2)[1:-1], 1e-307 * np.repeat(random.normal(size=len(times) - 1), 2))
+    drive = Drive(controller.rate_hz, controller.method, controller.limits)
+    found = simulate_sampled(case.design, asked, controller.anti_windup, drive, 800 / controller.rate_hz)
+    assert np.abs(found.control).max() > 0
+    case.compiled.rest()
+    for r, y, u in zip(found.reference, found.output, found.control, strict=True):
+        case.compiled.step(r, y)
+        assert case.compiled.logged == (u, 0)
+
+
 def test_its_own_test_passes_under_sanitizers(extended_design: Design, tmp_path: Path) -> None:
     """And fails where the last bit of one number is another."""
     controller = sampled_controller(extended_design, "corrected", (-12.0, 10.0), 2000.0, "tustin", "axis")
