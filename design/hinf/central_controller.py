@@ -12,14 +12,19 @@ from design.hinf.pick import Problem, Setting, level_of, nu_of, orders_of, pick_
 
 
 def central_controller(problem: Problem, gamma: float) -> Block | None:
-    """The controller of greatest entropy among those that bring the norm below gamma; None where rounding hides it.
+    """The controller of greatest entropy among those that bring the norm below gamma.
 
     Parameters
     ----------
     problem
         What is minimised.
     gamma
-        Feasible.
+        A norm that some controller reaches.
+
+    Returns
+    -------
+    Block or None
+        None where rounding errors are too large at every precision that is tried.
 
     Notes
     -----

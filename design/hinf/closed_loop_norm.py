@@ -26,7 +26,7 @@ def closed_loop_norm(G: Block, W1: Block, W2: Block, K: Block, decay_rate: float
     Raises
     ------
     InputError
-        1 + G K is zero at infinite frequency, or rounding hides the norm.
+        1 + G K is zero at infinite frequency, or rounding errors are too large for the norm.
 
     Notes
     -----
@@ -81,7 +81,7 @@ def closed_loop_poles(G: Block, K: Block) -> tuple[complex, ...]:
     Raises
     ------
     InputError
-        1 + G K vanishes at infinite frequency: the loop is not well posed; or rounding hides a pole.
+        1 + G K vanishes at infinite frequency: the loop is not well posed; or rounding errors are too large for a pole.
     """
     cancelled, zeros, poles = shared((*G.zeros, *K.zeros), (*G.poles, *K.poles))
     L = Block(G.gain * K.gain, tuple(zeros), tuple(poles))

@@ -29,9 +29,9 @@ class CharacteristicRoots(NamedTuple):
     """Roots sorted by decreasing real part, those of multiplicity m m times; three arrays of shape (n,) and a line.
 
     ``roots`` in rad/s; ``hidden``, whether no dead time moves the root, see :class:`DelayLoop`; ``uncertainty``, the
-    distance in rad/s within which rounding hides where it is: 0 for hidden roots and those of a Smith predictor, which
-    are given, relative to the root about 1e-15 for other simple ones and 1e-15^(1/m) for multiple ones. Right of the
-    real part ``line`` in rad/s there are no others.
+    distance in rad/s to which rounding errors leave its place open: 0 for hidden roots and those of a Smith predictor,
+    which are given, relative to the root about 1e-15 for other simple ones and 1e-15^(1/m) for multiple ones. Right of
+    the real part ``line`` in rad/s there are no others.
     """
 
     roots: Complex

@@ -134,7 +134,7 @@ class PlantModel:
         ------
         InputError
             See :func:`identification.model.python_control.from_control`; a root lies on the imaginary axis but not at
-            s = 0; or rounding hides whether a pole is at s = 0, see :data:`NEAR_ZERO`.
+            s = 0; or a pole cannot be distinguished from 0, see :data:`NEAR_ZERO`.
         """
         gain, every, found = from_control(system)
         zeros, poles = sorted(every, key=abs), sorted(found, key=abs)

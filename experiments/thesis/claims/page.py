@@ -18,19 +18,19 @@ TITLES = {
 }
 HEAD = """# The thesis's claims, judged
 
-Every number that the thesis's text prints, and every statement of it that can be tested, recomputed from
-`data/thesis/claims.csv` by `make claims`, which also makes this page; `make test` fails when a verdict in the ledger
-is not the one computed, in either direction.
+This page lists every number that the thesis's text prints, and every statement of it that can be tested, beside
+what we compute. `make claims` makes it from `data/thesis/claims.csv`. `make test` fails when a verdict in that
+ledger is not the computed one, in either direction.
 
-A number agrees when the computed one lies within half a unit of its last printed digit; the rounding of the printed
-inputs is propagated where that is exceeded. A statement is printed as *true*; on formulas it is judged by evaluating
-both sides, on chapter 2's loop with our weights and with others, since the thesis prints none. Inputs are what the
-thesis chose or measured: they are compared with what this project uses, and count as transcribed, never as reproduced.
+A number agrees when the computed one lies within half a unit of its last printed digit. Where the rounding of the
+printed inputs can move it farther, it agrees within that. A statement counts as printed *true*. We test a formula
+by evaluating both sides, on chapter 2's loop with our weights and with others, since the thesis prints none. Inputs
+are what the thesis chose or measured. We compare them with what this project uses; they count as transcribed, never
+as reproduced.
 
-The plant is the set `implied`, whose nine parameters are read off the printed theta_2. That the same nine give back
-theta_1, K_1, both G_A, C_aw and (4.8) but for omega_d1 is what the agreement of these says; that of theta_2 says
-nothing. C_0, F, K_0 and Table 4.2 follow from a, e, f, omega and T_d alone."""
-
+The plant is the set `implied`. We read its nine parameters off the printed theta_2, so that the agreement of
+theta_2 proves nothing. The agreement of theta_1, K_1, both G_A, C_aw and (4.8) does: the same parameters give them
+back, except for omega_d1 of (4.8). C_0, F, K_0 and Table 4.2 follow from a, e, f, omega and T_d alone."""
 
 NOT_COUNTED = """The ledger's quotes or the exceptions have changed since the numbers of the thesis's text were counted:
 `python -m experiments thesis coverage TEXT --record data/thesis/coverage.json` counts again."""
@@ -80,9 +80,9 @@ def _covered(record: Mapping[str, Any]) -> str:
     quoted, left = statuses.pop("quoted", 0), statuses.pop("left", 0)
     named = ", ".join(f"{count} {name}" for name, count in statuses.items())
     return (
-        f"Of the {record['numbers']} numbers in the thesis's text {quoted} are quoted by a row; {left} are neither "
-        f"that nor one of the exceptions that `data/thesis/exceptions.csv` names and explains: {named}. The text is "
-        "not shipped; `python -m experiments thesis coverage TEXT` counts again in yours (ours has the SHA-256 "
+        f"The thesis's text has {record['numbers']} numbers. Rows of this page quote {quoted} of them. "
+        f"`data/thesis/exceptions.csv` explains why others need no row: {named}. {left} are left. The text is not "
+        "shipped; `python -m experiments thesis coverage TEXT` counts again in yours (ours has the SHA-256 "
         f"`{record['text_sha256'][:16]}...`)."
     )
 
