@@ -17,7 +17,7 @@ from design.blocks.inner_outer import inner_outer
 from design.hinf.mixed_sensitivity import Synthesis
 from design.parameters import DelayFreeParameters, ExtendedParameters
 from identification.base.errors import InputError, shown
-from identification.base.json_object import member, number, read_json, require_known, texts
+from identification.base.json_object import member, number, read_json, require_all_read, texts
 from identification.model.additive_bound import AdditiveBound
 from identification.model.plant import PlantModel
 from identification.model.plant_json import bound_from_dict, bound_to_dict, plant_from_dict, plant_to_dict
@@ -220,7 +220,7 @@ def read_design(path: Path | str, kind: str | None = None) -> Design:
         for name, value in (("bandwidth", corrected.bandwidth), ("recovery_s", corrected.judgement.recovery_s)):
             if not 1e-100 < value < 1e100:
                 raise InputError(f"'{name}' of the corrected anti-windup is not a positive number")
-        require_known(content, design.to_dict())
+        require_all_read(content, design.to_dict())
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return design

@@ -127,7 +127,7 @@ def commands(
     r, y = rounded(reference), rounded(measurement)
     x_K, x_T, x_w = (np.zeros(len(block.b), kind) for block in blocks)
     p_T, p_w = np.zeros((len(d_T), len(r)), kind), np.zeros((1, len(r)), kind)
-    control = np.zeros(len(r), kind)
+    control, smallest = np.zeros(len(r), kind), np.finfo(kind).tiny
 
     def late(taps: Array, first: int, length: int, p: Array, k: int) -> Any:
         last = k - first
@@ -152,5 +152,5 @@ def commands(
         p_T[:, k] += d_T * v
         p_w[0, k] += d_w[1] * u_tilde
         following = rows(A_K, x_K) + b_K * e, rows(A_T, x_T) + b_T * v, rows(A_w, x_w) + b_w * u_tilde
-        x_K, x_T, x_w = (np.where(np.abs(x) < np.finfo(kind).tiny, kind(0), x) for x in following)
+        x_K, x_T, x_w = (np.where(np.abs(x) < smallest, kind(0), x) for x in following)
     return control, np.clip(control, low, high)

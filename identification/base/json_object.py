@@ -90,14 +90,14 @@ def objects(content: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
     return values
 
 
-def require_known(content: Any, known: Any, place: str = "") -> None:
+def require_all_read(content: Any, read: Any, place: str = "") -> None:
     """Require that a reader took all of a JSON document: a misspelt member that may be left out would not be missed.
 
     Parameters
     ----------
     content
         The document.
-    known
+    read
         What the program writes of it after it was read.
     place
         Where in a file it stands.
@@ -108,16 +108,16 @@ def require_known(content: Any, known: Any, place: str = "") -> None:
         A member is not known, a list has another length, or a value is of another type.
     """
     where = place or "the file"
-    if isinstance(content, dict) and isinstance(known, Mapping):
+    if isinstance(content, dict) and isinstance(read, Mapping):
         for key, value in content.items():
-            if key not in known:
-                raise InputError(f"{where} has the member {shown(key)}; expected one of {', '.join(known)}")
-            require_known(value, known[key], shown(key))
-    elif isinstance(content, list) and isinstance(known, list | tuple) and len(content) == len(known):
-        for own, other in zip(content, known, strict=True):
-            require_known(own, other, place)
-    elif isinstance(content, list) or _kind(content) is not _kind(known):
-        raise InputError(f"{where} is {shown(content)}; expected the form of {shown(known)}")
+            if key not in read:
+                raise InputError(f"{where} has the member {shown(key)}; expected one of {', '.join(read)}")
+            require_all_read(value, read[key], shown(key))
+    elif isinstance(content, list) and isinstance(read, list | tuple) and len(content) == len(read):
+        for own, other in zip(content, read, strict=True):
+            require_all_read(own, other, place)
+    elif isinstance(content, list) or _kind(content) is not _kind(read):
+        raise InputError(f"{where} is {shown(content)}; expected the form of {shown(read)}")
 
 
 def number(content: Mapping[str, Any], key: str) -> float:

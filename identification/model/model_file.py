@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from identification.base.errors import InputError
-from identification.base.json_object import member, read_json, require_known
+from identification.base.json_object import member, read_json, require_all_read
 from identification.model.additive_bound import AdditiveBound
 from identification.model.fit_record import FitRecord, Numbers
 from identification.model.plant import PlantModel
@@ -106,7 +106,7 @@ def read_model(path: Path | str) -> IdentifiedModel:
         errors = _recorded(content, "standard_errors", lambda found: from_shape(plant, found))
         fit = _recorded(content, "fit", lambda found: FitRecord.from_dict(found, plant, bound))
         model = IdentifiedModel(plant, bound, errors, fit, signals)
-        require_known(content, model.to_dict())
+        require_all_read(content, model.to_dict())
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return model
